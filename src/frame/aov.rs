@@ -1,0 +1,130 @@
+//! A finished frame and its layers.
+
+use super::FrameStats;
+use crate::scene::View;
+
+/// How a frame was made.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum FrameKind {
+    /// Every pixel traced: a key frame.
+    Traced,
+    /// Made from a neighbour.
+    Inferred {
+        /// The neighbour's frame number.
+        from: i64,
+    },
+}
+
+/// A layer beside the beauty.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Aov {
+    /// Planar depth.
+    Depth,
+    /// Pixel class.
+    Class,
+    /// World normal.
+    Normal,
+    /// World position.
+    Position,
+    /// Pixels to the next and from the previous frame.
+    Motion,
+    /// Object tag.
+    Object,
+    /// Diffuse part of the beauty.
+    Diffuse,
+    /// Highlights, reflection and refraction.
+    Specular,
+    /// Emission and the background.
+    Emission,
+    /// Each light's diffuse part.
+    Lights,
+}
+
+/// Which layers are wanted.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct AovSet(u16);
+
+impl AovSet {
+    /// This set and `aov`.
+    #[must_use]
+    pub fn with(self, aov: Aov) -> Self {
+        Self(self.0 | 1 << aov as u16)
+    }
+
+    /// True if `aov` is wanted.
+    pub fn contains(self, aov: Aov) -> bool {
+        self.0 & 1 << aov as u16 != 0
+    }
+}
+
+impl FromIterator<Aov> for AovSet {
+    fn from_iter<I: IntoIterator<Item = Aov>>(aovs: I) -> Self {
+        aovs.into_iter().fold(Self::default(), Self::with)
+    }
+}
+
+/// The part of the image that is rendered, in pixels of the full image.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Window {
+    /// Left column.
+    pub x: u32,
+    /// Top row.
+    pub y: u32,
+    /// Columns.
+    pub width: u32,
+    /// Rows.
+    pub height: u32,
+}
+
+impl Window {
+    /// Pixels in it.
+    pub fn pixels(&self) -> usize {
+        self.width as usize * self.height as usize
+    }
+}
+
+/// A finished frame: `window.pixels()` values in each layer, rows from the top; layers not asked for are empty.
+#[derive(Debug, Clone)]
+pub struct Frame {
+    /// Frame number.
+    pub number: i64,
+    /// Key frame or inferred.
+    pub kind: FrameKind,
+    /// The camera, and the size of the full image.
+    pub view: View,
+    /// Name of the camera.
+    pub camera: String,
+    /// The part that is rendered.
+    pub window: Window,
+    /// Linear Rec.709, premultiplied, exposure applied.
+    pub color: Vec<[f32; 4]>,
+    /// Planar depth in metres, background 1e10.
+    pub depth: Vec<f32>,
+    /// [`super::PixelClass`] numbers.
+    pub class: Vec<u8>,
+    /// World shading normal turned to the eye, background 0.
+    pub normal: Vec<[f32; 3]>,
+    /// World position, background 0.
+    pub position: Vec<[f32; 3]>,
+    /// Pixels to where the point is in the next frame, x right, y up.
+    pub forward: Vec<[f32; 2]>,
+    /// Pixels to where the point was in the previous frame, x right, y up.
+    pub backward: Vec<[f32; 2]>,
+    /// Object tags, background 0.
+    pub object: Vec<u32>,
+    /// Diffuse part of `color`.
+    pub diffuse: Vec<[f32; 3]>,
+    /// Specular part of `color`.
+    pub specular: Vec<[f32; 3]>,
+    /// Emission and background part of `color`.
+    pub emission: Vec<[f32; 3]>,
+    /// For each light: its name and its share of `diffuse`.
+    pub lights: Vec<(String, Vec<[f32; 3]>)>,
+    /// Counts and times.
+    pub stats: FrameStats,
+}
+
+impl Frame {
+    /// Depth written where only the background is seen: finite, because infinity breaks compositing tools.
+    pub const FAR_DEPTH: f32 = 1e10;
+}

@@ -1,0 +1,60 @@
+//! How a pixel was obtained.
+
+/// The fate of a pixel (the paper's good, missed, overlapped and bad pixels, and what later sections add).
+///
+/// The numbers are what the `pixelClass.id` channel holds.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+#[repr(u8)]
+pub enum PixelClass {
+    /// Traced as part of a key frame.
+    #[default]
+    Traced = 0,
+    /// Exactly one stored sample landed here; reused.
+    Good = 1,
+    /// Several landed here; the nearest is reused.
+    Overlapped = 2,
+    /// None landed here; traced.
+    Missed = 3,
+    /// Something unknown behind an old sample could be in front; traced.
+    Bad = 4,
+    /// Seen through a gap between samples of one object; traced.
+    Creeping = 5,
+    /// Outside the old viewing volume, where new objects may be; traced.
+    Entering = 6,
+    /// Near an edge, traced to centre it.
+    Edge = 7,
+    /// Something moved in front; traced.
+    Moved = 8,
+    /// A hole inside a surface, resolved from its neighbours; reused.
+    Filled = 9,
+}
+
+impl PixelClass {
+    /// Number of classes.
+    pub const COUNT: usize = 10;
+
+    /// All classes by number.
+    pub const ALL: [Self; Self::COUNT] = [
+        Self::Traced,
+        Self::Good,
+        Self::Overlapped,
+        Self::Missed,
+        Self::Bad,
+        Self::Creeping,
+        Self::Entering,
+        Self::Edge,
+        Self::Moved,
+        Self::Filled,
+    ];
+
+    /// Lower-case name, as in reports and headers.
+    pub fn name(self) -> &'static str {
+        ["traced", "good", "overlapped", "missed", "bad", "creeping", "entering", "edge", "moved", "filled"]
+            [self as usize]
+    }
+
+    /// True where a stored sample is shown, false where a camera ray was cast.
+    pub fn is_reused(self) -> bool {
+        matches!(self, Self::Good | Self::Overlapped | Self::Filled)
+    }
+}

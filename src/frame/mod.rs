@@ -1,0 +1,11 @@
+//! What a frame is made of: samples on surfaces, classes of pixels, layers, and counts.
+
+mod aov;
+mod class;
+mod sample;
+mod stats;
+
+pub use aov::{Aov, AovSet, Frame, FrameKind, Window};
+pub use class::PixelClass;
+pub use sample::{PackedNormal, SurfaceRef, SurfaceSample};
+pub use stats::{FrameStats, RayCounts, StageSeconds};

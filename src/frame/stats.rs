@@ -1,0 +1,69 @@
+//! What a frame cost, counted.
+
+use std::ops::AddAssign;
+
+/// Rays cast, by kind.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize, serde::Deserialize)]
+pub struct RayCounts {
+    /// From the eye through a pixel.
+    pub primary: u64,
+    /// From a first hit to a light.
+    pub shadow: u64,
+    /// From a first hit to the world.
+    pub ambient: u64,
+    /// Mirrored ones and all that follow from them, shadow rays included.
+    pub reflection: u64,
+    /// Refracted (or passing through blended surfaces) and all that follow from them, shadow rays included.
+    pub refraction: u64,
+    /// From the eye to a stored sample, to prove it visible (`verified`).
+    pub visibility: u64,
+}
+
+impl RayCounts {
+    /// Camera and shadow rays: the part that inference can save.
+    pub fn primary_and_shadow(&self) -> u64 {
+        self.primary + self.visibility + self.shadow
+    }
+
+    /// All rays.
+    pub fn total(&self) -> u64 {
+        self.primary_and_shadow() + self.ambient + self.reflection + self.refraction
+    }
+}
+
+impl AddAssign for RayCounts {
+    fn add_assign(&mut self, other: Self) {
+        self.primary += other.primary;
+        self.shadow += other.shadow;
+        self.ambient += other.ambient;
+        self.reflection += other.reflection;
+        self.refraction += other.refraction;
+        self.visibility += other.visibility;
+    }
+}
+
+/// Wall seconds of a frame's stages. They go into reports, never into a frame's file.
+#[derive(Debug, Clone, Copy, PartialEq, Default, serde::Serialize, serde::Deserialize)]
+pub struct StageSeconds {
+    /// Work that replaces tracing: project, clear, clean up.
+    pub infer: f64,
+    /// Camera and shadow rays.
+    pub trace: f64,
+    /// Everything that depends on the eye: texture, highlights, reflection, refraction.
+    pub enhance: f64,
+    /// Encoding and writing, beside the rendering of the next frame.
+    pub write: f64,
+}
+
+/// Everything counted about one frame.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct FrameStats {
+    /// Pixels of each class, by [`super::PixelClass`] number.
+    pub pixels: [u64; super::PixelClass::COUNT],
+    /// Rays cast.
+    pub rays: RayCounts,
+    /// Where the time went.
+    pub seconds: StageSeconds,
+    /// Reused samples that something hides from the eye, where audited.
+    pub hidden: Option<u64>,
+}

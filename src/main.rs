@@ -1,0 +1,2 @@
+//! `buzz-convert`: animated glTF in, EXR sequence out.
+fn main() {}

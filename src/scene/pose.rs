@@ -1,0 +1,160 @@
+//! The scene at one time: where every node, light and lens is.
+
+use super::{Camera, Curve, Lens, LightKind, PosedLight, Scene, Target, View};
+use glam::{DAffine3, DMat3, DQuat, DVec3, Vec3};
+
+/// A node's transform under its parent.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum LocalTransform {
+    /// Translation, rotation, scale; the only kind that can be animated.
+    Trs {
+        /// Metres.
+        translation: DVec3,
+        /// Unit.
+        rotation: DQuat,
+        /// May be negative or zero.
+        scale: DVec3,
+    },
+    /// Any affine matrix.
+    Matrix(DAffine3),
+}
+
+impl Default for LocalTransform {
+    fn default() -> Self {
+        Self::Trs { translation: DVec3::ZERO, rotation: DQuat::IDENTITY, scale: DVec3::ONE }
+    }
+}
+
+/// A node of the scene's tree at rest.
+#[derive(Debug, Clone, Default)]
+pub struct Node {
+    /// For messages and cameras' names.
+    pub name: String,
+    /// Index of the parent, always lower than the node's own.
+    pub parent: Option<usize>,
+    /// At rest.
+    pub transform: LocalTransform,
+    /// Morph weights at rest.
+    pub weights: Vec<f32>,
+    /// False hides the node and all below it.
+    pub hidden: bool,
+}
+
+/// What [`Scene::pose`] finds: the scene at one time.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Pose {
+    /// For each node.
+    pub world_from_node: Vec<DAffine3>,
+    /// For each node, its ancestors considered.
+    pub visible: Vec<bool>,
+    /// For each node.
+    pub weights: Vec<Vec<f32>>,
+    /// For each light.
+    pub lights: Vec<PosedLight>,
+    /// For each camera.
+    pub lenses: Vec<Lens>,
+}
+
+impl Scene {
+    /// The scene at `time` seconds; keys within a thousandth of a frame are met exactly.
+    pub fn pose(&self, time: f64) -> Pose {
+        let snap = self.timing.snap_seconds();
+        let mut transforms: Vec<LocalTransform> = self.nodes.iter().map(|n| n.transform).collect();
+        let mut weights: Vec<Vec<f32>> = self.nodes.iter().map(|n| n.weights.clone()).collect();
+        let mut visible: Vec<bool> = self.nodes.iter().map(|n| !n.hidden).collect();
+        let mut lenses: Vec<Lens> = self.cameras.iter().map(|c| c.lens).collect();
+        let mut lights = self.lights.clone();
+        let mut value = Vec::new();
+        for channel in &self.channels {
+            let curve: &Curve = &channel.curve;
+            curve.sample_into(time, snap, &mut value);
+            let v = value.as_slice();
+            match channel.target {
+                Target::Translation(n) => {
+                    if let LocalTransform::Trs { translation, .. } = &mut transforms[n] {
+                        *translation = DVec3::from_slice(v);
+                    }
+                }
+                Target::Rotation(n) => {
+                    if let LocalTransform::Trs { rotation, .. } = &mut transforms[n] {
+                        let q = DQuat::from_slice(v);
+                        *rotation = if q.length_squared() > 0.0 { q.normalize() } else { DQuat::IDENTITY };
+                    }
+                }
+                Target::Scale(n) => {
+                    if let LocalTransform::Trs { scale, .. } = &mut transforms[n] {
+                        *scale = DVec3::from_slice(v);
+                    }
+                }
+                Target::Weights(n) => weights[n] = v.iter().map(|&w| w as f32).collect(),
+                Target::Visible(n) => visible[n] = v[0] != 0.0,
+                Target::CameraYfov(c) => lenses[c].set_yfov(v[0]),
+                Target::CameraXmag(c) => lenses[c].set_xmag(v[0]),
+                Target::CameraYmag(c) => lenses[c].set_ymag(v[0]),
+                Target::CameraNear(c) => lenses[c].near = v[0],
+                Target::CameraFar(c) => lenses[c].far = v[0],
+                Target::LightColor(l) => lights[l].color = Vec3::new(v[0] as f32, v[1] as f32, v[2] as f32),
+                Target::LightIntensity(l) => lights[l].intensity = v[0] as f32,
+                Target::LightRange(l) => lights[l].range = Some(v[0] as f32),
+                Target::LightInnerCone(l) => {
+                    if let LightKind::Spot { inner_cone, .. } = &mut lights[l].kind {
+                        *inner_cone = v[0] as f32;
+                    }
+                }
+                Target::LightOuterCone(l) => {
+                    if let LightKind::Spot { outer_cone, .. } = &mut lights[l].kind {
+                        *outer_cone = v[0] as f32;
+                    }
+                }
+            }
+        }
+        let mut world_from_node: Vec<DAffine3> = Vec::with_capacity(self.nodes.len());
+        for (i, node) in self.nodes.iter().enumerate() {
+            let local = match transforms[i] {
+                LocalTransform::Trs { translation, rotation, scale } => {
+                    DAffine3::from_scale_rotation_translation(scale, rotation, translation)
+                }
+                LocalTransform::Matrix(matrix) => matrix,
+            };
+            world_from_node.push(node.parent.map_or(local, |p| world_from_node[p] * local));
+            visible[i] &= node.parent.is_none_or(|p| visible[p]);
+        }
+        let lights = lights.iter().map(|light| {
+            let world_from_light = world_from_node[light.node];
+            let lit = if visible[light.node] { light.intensity } else { 0.0 };
+            PosedLight {
+                kind: light.kind,
+                position: world_from_light.translation,
+                direction: world_from_light.transform_vector3(DVec3::NEG_Z).normalize_or(DVec3::NEG_Z),
+                intensity: light.color * lit,
+                range: light.range,
+            }
+        });
+        let lights = lights.collect();
+        Pose { world_from_node, visible, weights, lights, lenses }
+    }
+
+    /// What camera number `camera` sees in `pose`, on an image of `width` x `height` pixels.
+    ///
+    /// Position and direction come from the node; scale does not (nor does it change the lens). Right and up are
+    /// made orthonormal by Gram-Schmidt, so a mirrored parent mirrors the picture.
+    pub fn view(&self, pose: &Pose, camera: usize, width: u32, height: u32) -> View {
+        let Camera { node, .. } = &self.cameras[camera];
+        let world_from_camera = pose.world_from_node[*node];
+        let DMat3 { x_axis, y_axis, z_axis } = world_from_camera.matrix3;
+        let forward = (-z_axis).normalize_or(DVec3::NEG_Z);
+        let right = (x_axis - x_axis.project_onto(forward)).normalize_or(forward.any_orthonormal_vector());
+        let up = y_axis - y_axis.project_onto(forward) - y_axis.project_onto(right);
+        let up = up.normalize_or(right.cross(forward));
+        View {
+            eye: world_from_camera.translation,
+            right,
+            up,
+            forward,
+            lens: pose.lenses[camera],
+            width,
+            height,
+            pixel_aspect: self.timing.pixel_aspect,
+        }
+    }
+}

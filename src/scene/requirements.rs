@@ -1,0 +1,101 @@
+//! What a scene asks of the renderer, worked out once.
+
+use super::{AlphaMode, Scene, Target};
+
+/// Features that a scene uses; stages and stored fields that none of them needs are left out.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Requirements {
+    /// Something has a texture.
+    pub textures: bool,
+    /// Something is cut out by alpha or mixed with what is behind.
+    pub alpha: bool,
+    /// Something mirrors.
+    pub reflection: bool,
+    /// Something lets light through.
+    pub refraction: bool,
+    /// Nodes other than cameras and lights move, are deformed, appear or vanish.
+    pub moving_objects: bool,
+    /// Lights move or change.
+    pub changing_lights: bool,
+    /// The lens changes.
+    pub lens_change: bool,
+}
+
+/// Roughness above which a surface mirrors nothing; see `docs/shading.md`.
+pub const MIRROR_ROUGHNESS: f32 = 0.3;
+
+impl Requirements {
+    /// What `scene` requires.
+    pub fn of(scene: &Scene) -> Self {
+        let mut needs = Self::default();
+        for material in scene.instances.iter().map(|i| &scene.materials[scene.meshes[i.mesh].material]) {
+            needs.textures |= material.has_textures();
+            needs.alpha |= material.alpha_mode != AlphaMode::Opaque;
+            let may_be_smooth =
+                material.roughness < MIRROR_ROUGHNESS || material.metallic_roughness_texture.is_some();
+            needs.reflection |=
+                may_be_smooth && !material.unlit && (material.specular > 0.0 || material.metallic > 0.0);
+            needs.refraction |= material.transmission > 0.0 || material.alpha_mode == AlphaMode::Blend;
+        }
+        let moved = scene.moved_nodes();
+        needs.moving_objects = scene.instances.iter().any(|i| moved[i.node] || scene.is_deformed(i));
+        needs.changing_lights = scene.lights.iter().any(|l| moved[l.node]);
+        for channel in &scene.channels {
+            match channel.target {
+                Target::LightColor(_)
+                | Target::LightIntensity(_)
+                | Target::LightRange(_)
+                | Target::LightInnerCone(_)
+                | Target::LightOuterCone(_) => needs.changing_lights = true,
+                Target::CameraYfov(_) | Target::CameraXmag(_) | Target::CameraYmag(_) => {
+                    needs.lens_change = true
+                }
+                _ => {}
+            }
+        }
+        needs
+    }
+
+    /// Names of what is required, for reports.
+    pub fn names(&self) -> Vec<&'static str> {
+        let all = [
+            (self.textures, "textures"),
+            (self.alpha, "alpha"),
+            (self.reflection, "reflection"),
+            (self.refraction, "refraction"),
+            (self.moving_objects, "moving-objects"),
+            (self.changing_lights, "changing-lights"),
+            (self.lens_change, "lens-change"),
+        ];
+        all.into_iter().filter_map(|(needed, name)| needed.then_some(name)).collect()
+    }
+}
+
+impl Scene {
+    /// For each node: whether an animation moves, hides or shows it or one of its ancestors.
+    pub fn moved_nodes(&self) -> Vec<bool> {
+        let mut moved = vec![false; self.nodes.len()];
+        for channel in &self.channels {
+            if let Target::Translation(n) | Target::Rotation(n) | Target::Scale(n) | Target::Visible(n) =
+                channel.target
+            {
+                moved[n] = true;
+            }
+        }
+        for n in 0..moved.len() {
+            moved[n] |= self.nodes[n].parent.is_some_and(|p| moved[p]);
+        }
+        moved
+    }
+
+    /// True for instances whose vertices move: skinned to animated joints, or with animated morph weights.
+    pub fn is_deformed(&self, instance: &super::Instance) -> bool {
+        let morphed = !self.meshes[instance.mesh].morph_targets.is_empty()
+            && self.channels.iter().any(|c| c.target == Target::Weights(instance.node));
+        let skinned = instance.skin.is_some_and(|s| {
+            let moved = self.moved_nodes();
+            self.skins[s].joints.iter().any(|&j| moved[j])
+        });
+        morphed || skinned
+    }
+}
