@@ -557,13 +557,11 @@ def move_camera(scene):
     """The walk with its fast pan, and after the cut the low shot."""
     walk = np.arange(CUT)
     eyes = camera.spline({0: (0.9, 1.65, 7.0), 20: (2.0, 1.7, 5.6), 40: (2.4, 1.7, 4.4), 59: (1.7, 1.62, 3.3)}, walk)
-    # Azimuth and height of the view, in degrees; the pan swings by 88 degrees in 8 frames.
+    # Heading and pitch in degrees; the pan swings by 88 degrees in 8 frames.
     heading = camera.spline(
         {0: (-14, 2.5), 16: (-11, 2.0), 34: (-4, 0.5), 38: (42, -1.5), 42: (84, -2.5), 52: (87, -2), 59: (87, -1.5)},
         walk,
     )
-    azimuth, height = np.radians(heading).T
-    ahead = np.column_stack([np.sin(azimuth) * np.cos(height), np.sin(height), -np.cos(azimuth) * np.cos(height)])
 
     low = np.arange(FRAMES - CUT)
     low_eyes = camera.spline({0: (-4.6, 0.9, 3.4), 18: (-3.9, 1.15, 4.2), 35: (-2.9, 1.55, 4.8)}, low)
@@ -571,7 +569,7 @@ def move_camera(scene):
 
     scene.shots(
         [
-            ("Walk", eyes, camera.quaternions(camera.look_at(eyes, eyes + ahead))),
+            ("Walk", eyes, camera.quaternions(camera.look_along(*heading.T))),
             ("Low", low_eyes, camera.quaternions(camera.look_at(low_eyes, targets))),
         ],
         yfov=np.radians(48),

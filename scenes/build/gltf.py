@@ -21,6 +21,7 @@ class Scene:
         self.name = name
         self.binary = bytearray()
         self.images = {}
+        self.stored = {}
         self.lights = []
         self.frames = 0
         self.document = {
@@ -113,18 +114,26 @@ class Scene:
 
     def _primitive(self, surface, material):
         described = self.document["materials"][material]
+        textured = "normalTexture" in described or any("Texture" in k for k in described["pbrMetallicRoughness"])
+        layout = (textured, "normalTexture" in described)
+        # A surface that wears several materials is stored once; it is kept here so that its id stays its own.
+        key = (id(surface), layout)
+        if key not in self.stored:
+            self.stored[key] = (surface, self._geometry(surface, *layout))
+        return {**self.stored[key][1], "material": material}
+
+    def _geometry(self, surface, textured, bumpy):
         attributes = {
             "POSITION": self._accessor(surface.positions, "VEC3", FLOAT, ARRAY_BUFFER, bounds=True),
             "NORMAL": self._accessor(surface.normals, "VEC3", FLOAT, ARRAY_BUFFER),
         }
-        textured = "normalTexture" in described or any("Texture" in k for k in described["pbrMetallicRoughness"])
         if textured:
             attributes["TEXCOORD_0"] = self._accessor(surface.uvs, "VEC2", FLOAT, ARRAY_BUFFER)
-        if "normalTexture" in described:
+        if bumpy:
             attributes["TANGENT"] = self._accessor(surface.tangents(), "VEC4", FLOAT, ARRAY_BUFFER)
         index_type = USHORT if len(surface.positions) < 65535 else UINT
         indices = self._accessor(surface.triangles.reshape(-1), "SCALAR", index_type, ELEMENT_ARRAY_BUFFER)
-        return {"attributes": attributes, "indices": indices, "material": material}
+        return {"attributes": attributes, "indices": indices}
 
     def _accessor(self, values, kind, component, target=None, bounds=False):
         dtype = {FLOAT: "<f4", USHORT: "<u2", UINT: "<u4"}[component]
@@ -184,7 +193,7 @@ class Scene:
     def shots(self, shots, yfov, fps, resolution, world):
         """Adds a camera for each shot, and `scene.extras.buzz` that cuts from one to the next.
 
-        A shot is (camera name, positions, quaternions), one LINEAR key a frame; the shots follow each other from frame 0.
+        A shot is (camera name, positions, quaternions) with one LINEAR key a frame; the first begins at frame 0.
         """
         lens = {"yfov": float(yfov), "znear": 0.05, "aspectRatio": resolution[0] / resolution[1]}
         samplers, channels, cuts = [], [], []

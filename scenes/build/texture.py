@@ -43,7 +43,7 @@ def _value_noise(size, across, down, seed):
 
 
 def courses(size, rows, columns, seed, jitter=0.0):
-    """Masonry in courses, each shifted by half a stone: (distance to the nearest joint in tiles, a random tone a stone).
+    """Masonry in courses, each shifted by half a stone: (distance to the nearest joint in tiles, the stone's tone).
 
     `jitter` varies the widths of the stones, as a share of their mean width.
     """
