@@ -1,0 +1,1 @@
+"""The Blender side: an extension (File > Export > Buzz glTF, a Render-properties panel) that is also a script."""
