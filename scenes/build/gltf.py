@@ -182,6 +182,16 @@ class Scene:
         light = {"type": "point", "intensity": LUMENS_PER_WATT * watts / (4 * np.pi)}
         self._light(name, light, colour, translation=position)
 
+    def spot(self, name, position, direction, watts, cone, colour=(1, 1, 1)):
+        """Adds a spot of so many watts, as Blender counts them, with inner and outer half-angles in degrees."""
+        inner, outer = np.radians(cone)
+        light = {
+            "type": "spot",
+            "intensity": LUMENS_PER_WATT * watts / (4 * np.pi),
+            "spot": {"innerConeAngle": inner, "outerConeAngle": outer},
+        }
+        self._light(name, light, colour, translation=position, rotation=_turn_minus_z_to(direction))
+
     def _light(self, name, light, colour, **placing):
         self._require("KHR_lights_punctual")
         self.lights.append({"name": name, "color": [float(c) for c in colour], **light})
