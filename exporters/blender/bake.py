@@ -57,9 +57,10 @@ def _unwrap(scene: bpy.types.Scene, ob: bpy.types.Object) -> None:
     """A UV map of its own for the baked images, without overlaps."""
     if _UV in ob.data.uv_layers:
         return
-    layer = ob.data.uv_layers.new(name=_UV, do_init=True)
-    active = ob.data.uv_layers.active
-    ob.data.uv_layers.active = layer
+    # Names, not layers: adding one moves the others in memory.
+    active = ob.data.uv_layers.active.name if ob.data.uv_layers.active else None
+    ob.data.uv_layers.new(name=_UV, do_init=True)
+    ob.data.uv_layers.active = ob.data.uv_layers[_UV]
     _only(scene, ob)
     bpy.ops.object.mode_set(mode="EDIT")
     bpy.ops.mesh.select_all(action="SELECT")
@@ -67,7 +68,7 @@ def _unwrap(scene: bpy.types.Scene, ob: bpy.types.Object) -> None:
     bpy.ops.object.mode_set(mode="OBJECT")
     if active is not None:
         # What other textures use (the render layer) must stay what it was.
-        ob.data.uv_layers.active = ob.data.uv_layers[active.name]
+        ob.data.uv_layers.active = ob.data.uv_layers[active]
 
 
 def _only(scene: bpy.types.Scene, ob: bpy.types.Object) -> None:

@@ -6,6 +6,8 @@ never save it, and the operators in ui.py work on a copy in a background Blender
 
 from __future__ import annotations
 
+import contextlib
+import io
 import re
 import shutil
 import tempfile
@@ -19,7 +21,7 @@ import numpy as np
 
 from ..common import extras, motion
 from ..common.document import Document
-from ..common.report import InputError, Lost, OutputError
+from ..common.report import ExportError, InputError, Lost, OutputError
 from . import cameras, world
 from .bake import bake_procedural
 from .materials import prepare_materials
@@ -115,13 +117,13 @@ class _Export:
     def _geometry(self, sampler: Sampler) -> Document:
         """Have Blender's exporter write the meshes and materials; a document without nodes."""
         shapes = sampler.geometry.shapes
-        materials = [m for m in dict.fromkeys(m for s in shapes for m in s.mesh.materials) if m is not None]
         temporary = bpy.data.scenes.new("export")
         bpy.context.window.scene = temporary
         sampler.geometry.build(temporary, np.array(sampler.taken))
         if self.options.bake:
             bake_procedural(temporary, self.options.bake, self.options.progress)
-        prepare_materials(materials, self.lost)
+        slots = [slot.material for ob in temporary.collection.objects for slot in ob.material_slots]
+        prepare_materials([m for m in dict.fromkeys(slots) if m is not None], self.lost)
         separate = self.path.suffix == ".gltf"
         target = self.work / f"{self.path.stem}{self.path.suffix}"
         if shapes:
@@ -142,7 +144,10 @@ class _Export:
         for node in document.root.pop("nodes", []):
             match = re.fullmatch(r"shape-(\d+)", node.get("name", ""))
             if match and "mesh" in node:
-                sampler.geometry.shapes[int(match[1])].mesh_index = node["mesh"]
+                shape = sampler.geometry.shapes[int(match[1])]
+                shape.mesh_index = node["mesh"]
+                # Blender numbers copies (.001); the file gets the artist's name back.
+                document.root["meshes"][node["mesh"]]["name"] = shape.name
         for key in ("scenes", "scene", "animations", "skins", "cameras"):
             document.root.pop(key, None)
         for mesh in document.root.get("meshes", []):
@@ -254,7 +259,16 @@ def _call_exporter(path: Path, separate: bool, textures: str) -> None:
     }
     # Options come and go between 4.2 and 5.x; those left out here have the values wanted by default.
     known = bpy.ops.export_scene.gltf.get_rna_type().properties.keys()
-    bpy.ops.export_scene.gltf(filepath=str(path), **{k: v for k, v in wanted.items() if k in known})
+    log = io.StringIO()
+    try:
+        with contextlib.redirect_stdout(log), contextlib.redirect_stderr(log):
+            bpy.ops.export_scene.gltf(filepath=str(path), **{k: v for k, v in wanted.items() if k in known})
+    except RuntimeError as error:
+        lines = [line.strip() for line in str(error).splitlines() if line.strip() and not line.startswith("Location")]
+        last = next((line for line in reversed(lines) if "Error" in line), lines[-1])
+        mesh = re.findall(r"Extracting primitive: (.*)", log.getvalue())
+        where = f" at mesh {mesh[-1]!r}" if mesh else ""
+        raise ExportError(f"Blender's glTF exporter failed{where}: {last}; hide that object from the render, or simplify it") from None
 
 
 def _name_scene_losses(scene: bpy.types.Scene, lost: Lost) -> None:
@@ -277,7 +291,7 @@ def _name_scene_losses(scene: bpy.types.Scene, lost: Lost) -> None:
         if ob.hide_render:
             continue
         for flag, label in (("is_holdout", "holdout"), ("is_shadow_catcher", "shadow catcher")):
-            if getattr(ob, flag, False):
+            if ob.type == "MESH" and getattr(ob, flag, False):
                 lost.add(ob.name, label, "it is rendered as an ordinary object; use its objectId in compositing")
         if ob.type == "MESH" and not getattr(ob, "visible_camera", True):
             lost.add(ob.name, "hidden from camera rays", "it is seen here; hide it from the render or leave it out")

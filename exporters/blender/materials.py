@@ -6,6 +6,8 @@ turns white without a word.
 
 from __future__ import annotations
 
+import os
+
 import bpy
 
 from ..common.report import Lost
@@ -28,6 +30,8 @@ def prepare_materials(materials: list[bpy.types.Material], lost: Lost) -> None:
             continue
         if is_animated(material) or is_animated(tree):
             lost.add(material.name, "animated material", "the values of the first frame are used")
+        _drop_broken_groups(tree, material.name, lost)
+        _name_missing_images(tree, material.name, lost)
         output = tree.get_output_node("ALL") or tree.get_output_node("CYCLES")
         if output is None or not output.inputs["Surface"].is_linked:
             continue
@@ -62,6 +66,26 @@ def _name_losses(shader: bpy.types.Node, name: str, lost: Lost) -> None:
         value = shader.inputs.get(socket)
         if value is not None and (value.is_linked or value.default_value > 0):
             lost.add(name, label, "it is rendered as without it")
+
+
+def _drop_broken_groups(tree: bpy.types.NodeTree, name: str, lost: Lost) -> None:
+    """Take out node groups without a tree (a missing library) or without an output: Blender's exporter stops on them."""
+    for node in list(tree.nodes):
+        if node.type == "GROUP" and (node.node_tree is None or all(n.type != "GROUP_OUTPUT" for n in node.node_tree.nodes)):
+            label = node.node_tree.name if node.node_tree is not None else node.name
+            lost.add(name, f"node group {label!r} (missing or without output)", "bring the library back, or the group is left out")
+            tree.nodes.remove(node)
+
+
+def _name_missing_images(tree: bpy.types.NodeTree, name: str, lost: Lost) -> None:
+    for node in tree.nodes:
+        if node.type != "TEX_IMAGE" or node.image is None:
+            continue
+        image = node.image
+        if image.source == "FILE" and not image.packed_file and not os.path.isfile(bpy.path.abspath(image.filepath, library=image.library)):
+            lost.add(name, f"image {image.name!r} is missing", "find it with File > External Data > Find Missing Files")
+        if image.source in ("SEQUENCE", "MOVIE"):
+            lost.add(name, f"image {image.name!r} is a movie", "its first frame is used for the whole shot")
 
 
 def _upstream(socket: bpy.types.NodeSocket) -> list[bpy.types.Node]:

@@ -15,6 +15,7 @@ _LEVELS = (("levels", "render_levels"), ("screw_steps", "render_steps"), ("steps
 
 def prepare(scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer) -> None:
     """Set everything that differs between viewport and render to the render's value."""
+    _leave_edit_mode(view_layer)
     if scene.render.use_simplify:
         scene.render.simplify_subdivision = scene.render.simplify_subdivision_render
         scene.render.simplify_child_particles = scene.render.simplify_child_particles_render
@@ -40,6 +41,16 @@ def prepare(scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer) -> None:
     for ball in bpy.data.metaballs:
         ball.resolution = ball.render_resolution
     view_layer.update()
+
+
+def _leave_edit_mode(view_layer: bpy.types.ViewLayer) -> None:
+    """A file saved while a mesh was being edited opens in edit mode, where the evaluated mesh has no attributes."""
+    active = view_layer.objects.active
+    for ob in view_layer.objects:
+        if ob.mode != "OBJECT":
+            view_layer.objects.active = ob
+            bpy.ops.object.mode_set(mode="OBJECT")
+    view_layer.objects.active = active
 
 
 def _show_layers(layer: bpy.types.LayerCollection) -> None:

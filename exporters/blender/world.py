@@ -44,8 +44,10 @@ def export_world(scene: bpy.types.Scene, folder: Path, stem: str, lost: Lost) ->
         image = _environment(colour.links[0].from_node)
         if image is not None:
             uri = _put_image(image[0], folder, stem)
-            if uri is not None:
-                return {"color": [1, 1, 1], "strength": tidy(strength), "image": uri, "rotation": tidy(image[1])}
+            if uri is None:
+                lost.add(world.name, f"image {image[0].name!r} is missing", "find it with File > External Data > Find Missing Files; the world is black")
+                return {"color": [0, 0, 0], "strength": 1}
+            return {"color": [1, 1, 1], "strength": tidy(strength), "image": uri, "rotation": tidy(image[1])}
     if is_animated(tree):
         lost.add(world.name, "animated world nodes", "the sky of the first frame is used; animate only colour and strength of a Background node")
     return {"color": [1, 1, 1], "strength": 1, "image": _bake(scene, folder, stem), "rotation": 0}
@@ -98,10 +100,9 @@ def _environment(node: bpy.types.Node) -> tuple[bpy.types.Image, float] | None:
 
 def _put_image(image: bpy.types.Image, folder: Path, stem: str) -> str | None:
     """Copy or write the environment image beside the glTF; its file name. None if it has no pixels."""
-    if not image.has_data:
-        image.update()
-        if not image.size[0] or not len(image.pixels):
-            return None
+    # Asking for the size makes Blender load the file.
+    if not image.size[0]:
+        return None
     suffix = Path(image.filepath_raw or image.name).suffix.lower()
     linear = image.colorspace_settings.name.startswith(("Linear", "scene_linear"))
     eight_bit = suffix in (".png", ".jpg", ".jpeg")
