@@ -2,6 +2,8 @@
 
 pub mod error;
 pub mod frame;
+pub mod infer;
+pub mod plan;
 pub mod scene;
 pub mod sequence;
 
