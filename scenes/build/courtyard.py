@@ -57,7 +57,7 @@ def masonry(scene):
         roughness=1.0,
         texture=scene.texture("paving", colour),
         normal=scene.texture("paving_normal", normal_map(relief, 6.0)),
-        metallic_roughness=scene.texture("paving_roughness", rough[::2, ::2], levels=24),
+        metallic_roughness=scene.texture("paving_roughness", rough[::2, ::2], step=8),
     )
 
     edge, tone = courses(512, 16, 6, seed=21, jitter=0.12)

@@ -43,10 +43,10 @@ class Scene:
 
     # ---- images and materials
 
-    def texture(self, name, image, levels=64):
+    def texture(self, name, image, step=4):
         """Adds a repeating, mip-mapped texture, saved as textures/<name>.png; returns its index."""
         uri = f"textures/{name}.png"
-        self.images[uri] = encode_png(image, levels)
+        self.images[uri] = encode_png(image, step)
         if "samplers" not in self.document:
             linear_mipmap, linear, repeat = 9987, 9729, 10497
             self._add(
@@ -137,7 +137,8 @@ class Scene:
 
     def _accessor(self, values, kind, component, target=None, bounds=False):
         dtype = {FLOAT: "<f4", USHORT: "<u2", UINT: "<u4"}[component]
-        values = np.ascontiguousarray(values, dtype)
+        # Processors differ in the last bit of a sine; rounding keeps that out of the files.
+        values = np.ascontiguousarray(np.round(values, 7), dtype)
         self.binary.extend(b"\0" * (-len(self.binary) % 4))
         view = {"buffer": 0, "byteOffset": len(self.binary), "byteLength": values.nbytes}
         if target:
@@ -160,14 +161,14 @@ class Scene:
         """Adds a node to the scene, turned about Y by degrees or by a quaternion; `links` are mesh=, camera= ..."""
         node = {"name": name, **links}
         if any(translation):
-            node["translation"] = [float(t) for t in translation]
+            node["translation"] = _tidy(translation)
         if turn:
             half = np.radians(turn) / 2
             rotation = (0, np.sin(half), 0, np.cos(half))
         if rotation is not None:
-            node["rotation"] = [float(r) for r in rotation]
+            node["rotation"] = _tidy(rotation)
         if any(s != 1 for s in scale):
-            node["scale"] = [float(s) for s in scale]
+            node["scale"] = _tidy(scale)
         index = self._add("nodes", node)
         self.document["scenes"][0]["nodes"].append(index)
         return index
@@ -184,17 +185,17 @@ class Scene:
 
     def spot(self, name, position, direction, watts, cone, colour=(1, 1, 1)):
         """Adds a spot of so many watts, as Blender counts them, with inner and outer half-angles in degrees."""
-        inner, outer = np.radians(cone)
         light = {
             "type": "spot",
             "intensity": LUMENS_PER_WATT * watts / (4 * np.pi),
-            "spot": {"innerConeAngle": inner, "outerConeAngle": outer},
+            "spot": dict(zip(("innerConeAngle", "outerConeAngle"), _tidy(np.radians(cone)), strict=True)),
         }
         self._light(name, light, colour, translation=position, rotation=_turn_minus_z_to(direction))
 
     def _light(self, name, light, colour, **placing):
         self._require("KHR_lights_punctual")
-        self.lights.append({"name": name, "color": [float(c) for c in colour], **light})
+        light["intensity"] = round(light["intensity"], 3)
+        self.lights.append({"name": name, "color": _tidy(colour), **light})
         link = {"KHR_lights_punctual": {"light": len(self.lights) - 1}}
         self.node(name, extensions=link, **placing)
 
@@ -205,7 +206,7 @@ class Scene:
 
         A shot is (camera name, positions, quaternions) with one LINEAR key a frame; the first begins at frame 0.
         """
-        lens = {"yfov": float(yfov), "znear": 0.05, "aspectRatio": resolution[0] / resolution[1]}
+        lens = {"yfov": round(float(yfov), 7), "znear": 0.05, "aspectRatio": resolution[0] / resolution[1]}
         samplers, channels, cuts = [], [], []
         for name, positions, rotations in shots:
             camera = self._add("cameras", {"type": "perspective", "name": name, "perspective": lens})
@@ -255,6 +256,11 @@ class Scene:
             target = Path(folder) / path
             target.parent.mkdir(parents=True, exist_ok=True)
             target.write_bytes(data)
+
+
+def _tidy(numbers):
+    """Plain numbers, rounded for the same reason as in `_accessor`."""
+    return [round(float(n), 7) for n in numbers]
 
 
 def _turn_minus_z_to(direction):
