@@ -5,6 +5,6 @@ pub mod frame;
 pub mod infer;
 pub mod plan;
 pub mod scene;
-pub mod sequence;
+//pub mod sequence;
 
 pub use error::{Error, Result};

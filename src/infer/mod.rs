@@ -74,13 +74,13 @@ impl Inference {
         marks.clear(old.object.len());
 
         // Project the old pixels; the nearest hit wins.
-        project(old, &to, landings, marks);
+        let nearest = project(old, &to, landings, marks);
 
         // Clear what the line L behind an old hit could be hiding.
         obscured(old, &from, &to, landings, marks);
 
-        // Clear the contested area, where new objects may come in.
-        if let Some(k) = nearest_depth(landings, new.object.len()) {
+        // Clear the contested area, where new objects may come in: k is the nearest that is known.
+        if let Some(k) = nearest {
             entering(old_view, new_view, f64::from(k), marks);
         }
         gather(old, landings, marks, new);
@@ -102,12 +102,6 @@ impl Cost {
         self.rays += buffer.cast_unknown(view, rays);
         self.tracing += start.elapsed();
     }
-}
-
-/// The minimum depth of the projected points: k, where the paper leaves it to be found.
-fn nearest_depth(landings: &Landings, pixels: usize) -> Option<f32> {
-    let nearest = (0..pixels).into_par_iter().with_min_len(1 << 14).filter_map(|i| landings.z(i));
-    nearest.filter(|z| z.is_finite()).reduce_with(f32::min)
 }
 
 /// What has been found out about each pixel. The strongest finding stays, whatever the order of finding.

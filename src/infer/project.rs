@@ -36,21 +36,29 @@ impl Landings {
 }
 
 /// Projects every old sample, keeps the nearest on each pixel, and marks pixels on which several landed.
-pub fn project(old: &BuzzBuffer, new_view: &Projector, landings: &Landings, marks: &Marks) {
+///
+/// Returns the least depth of all that is before the new eye, in the window or not.
+pub fn project(old: &BuzzBuffer, new_view: &Projector, landings: &Landings, marks: &Marks) -> Option<f32> {
     let width = old.width();
-    (0..old.height()).into_par_iter().with_min_len(8).for_each(|y| {
+    let project_row = |y: usize| {
+        let mut nearest = f32::INFINITY;
         for i in y * width..(y + 1) * width {
             let background = old.surface[i].is_background();
             let Some(p) = new_view.project(old.position[i], old.normal[i].get(), background) else {
                 continue;
             };
+            nearest = nearest.min(p.z);
             let Some(pixel) = new_view.pixel(p.x, p.y) else { continue };
             let landing = u64::from(p.z.to_bits()) << 32 | i as u64;
             if landings.0[pixel].fetch_min(landing, Relaxed) != EMPTY {
                 marks.set(pixel, PixelClass::Overlapped);
             }
         }
-    });
+        nearest
+    };
+    let nearest =
+        (0..old.height()).into_par_iter().with_min_len(8).map(project_row).reduce(|| f32::INFINITY, f32::min);
+    nearest.is_finite().then_some(nearest)
 }
 
 /// Moves the winners' data into the new buffer. Pixels that nothing reached, or whose sample something may hide,

@@ -90,8 +90,8 @@ impl Settings {
 
 /// Told what happens, and asked whether to go on.
 pub trait Observer {
-    /// A frame is finished (and, if it was asked for, given to the sink).
-    fn frame_done(&mut self, number: i64, kind: FrameKind, stats: &FrameStats);
+    /// A frame is finished; if it was `wanted` it has been given to the sink, otherwise others hang on it.
+    fn frame_done(&mut self, number: i64, kind: FrameKind, stats: &FrameStats, wanted: bool);
 
     /// The signal by which the user asked to stop, if so.
     fn stop_requested(&self) -> Option<i32> {
@@ -288,7 +288,7 @@ impl Emitter<'_> {
             frame.stats = stats;
             self.sink.put(frame)?;
         }
-        self.observer.frame_done(number, kind, &stats);
+        self.observer.frame_done(number, kind, &stats, self.wanted.contains(&number));
         match self.observer.stop_requested() {
             Some(signal) => Err(Error::Interrupted { signal }),
             None => Ok(()),
