@@ -9,7 +9,7 @@ pub use path::camera_path;
 
 use crate::accel::Accel;
 use crate::error::{Error, Result};
-use crate::frame::{Aov, AovSet, Frame, FrameKind, FrameStats, PixelClass, RayCounts, SurfaceSample, Window};
+use crate::frame::{Aov, AovSet, Frame, FrameKind, FrameStats, PixelClass, RayCounts, StageSeconds, SurfaceSample, Window};
 use crate::infer::{BuzzBuffer, CastRays, Inference, Projector};
 use crate::plan::{Plan, Segment};
 use crate::scene::{Pose, Scene, View};
@@ -26,6 +26,9 @@ pub trait FrameSink {
 
     /// Takes a finished frame. May return before it is written: encoding runs beside the next frame's rendering.
     fn put(&mut self, frame: Frame) -> Result<()>;
+
+    /// Waits until all frames are written. Returns the seconds that each frame's encoding and writing took.
+    fn finish(&mut self) -> Result<Vec<(i64, StageSeconds)>>;
 }
 
 /// How accurate an inferred frame is.

@@ -1,0 +1,49 @@
+//! The command line: arguments as typed, the job as meant, progress, messages. Only here is anything printed.
+
+mod args;
+mod compare;
+mod convert;
+mod inspect;
+mod interrupt;
+mod job;
+mod parse;
+mod plan;
+mod progress;
+
+use anyhow::Result;
+use args::{Cli, Command};
+use clap::{CommandFactory, Parser, error::ErrorKind};
+use std::process::ExitCode;
+
+/// Runs the program and returns its exit code.
+pub fn run() -> ExitCode {
+    let cli = match Cli::try_parse() {
+        Ok(cli) => cli,
+        Err(error) => {
+            // A reader that went away is no reason to fail: there is nobody to tell.
+            let _ = error.print();
+            return ExitCode::from(if error.use_stderr() { 2 } else { 0 });
+        }
+    };
+    match dispatch(cli) {
+        Ok(code) => code,
+        Err(error) => {
+            eprintln!("buzz-convert: {error:#}");
+            let code = error.downcast_ref::<buzz::Error>().map_or(1, buzz::Error::exit_code);
+            ExitCode::from(code)
+        }
+    }
+}
+
+fn dispatch(cli: Cli) -> Result<ExitCode> {
+    match (cli.command, cli.convert) {
+        (Some(Command::Plan(args)), _) => plan::run(args),
+        (Some(Command::Inspect(args)), _) => inspect::run(args),
+        (Some(Command::Compare(args)), _) => compare::run(args),
+        (None, Some(args)) => convert::run(args),
+        (None, None) => {
+            let error = Cli::command().error(ErrorKind::MissingRequiredArgument, "INPUT and OUT_DIR are missing");
+            error.exit()
+        }
+    }
+}
