@@ -1,8 +1,10 @@
 //! Renders animated camera moves: traces key frames, infers the frames between them.
 
+pub mod accel;
 pub mod error;
 pub mod frame;
 pub mod scene;
 pub mod sequence;
+pub mod trace;
 
 pub use error::{Error, Result};
