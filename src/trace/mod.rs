@@ -1,0 +1,1 @@
+//! Tracing as Whitted did.
