@@ -37,7 +37,7 @@ BUZZ = np.array([10.0, 13.0, 4.0])
 
 #: How many towers of each shape; the faces of each are counted in `TOWERS`.
 TOWER_COUNTS = {"stepped": 10, "hexagonal": 10, "octagonal": 8, "pyramid": 12, "box": 24, "wedge": 14}
-HOUSES, LAWNS = 30, 25
+HOUSES = 30
 
 SUN = np.array([0.42, 0.52, 0.75])
 HORIZON, HALF_WIDTH = 1500.0, 6000.0
@@ -70,7 +70,7 @@ def build():
     solids, quadrics = model()
     check(solids, quadrics)
     for solid in solids:
-        surface = join(polygon(face, TILES.get(solid.material, 1.0)) for face in solid.faces)
+        surface = join(textured(face, solid.material) for face in solid.faces)
         extras = {"polygons": len(solid.faces), "reflective": solid.material in GLASS}
         mesh = scene.mesh(solid.name, (surface, materials[solid.material]))
         scene.node(solid.name, mesh=mesh, extras=extras)
@@ -101,6 +101,14 @@ def build():
     return scene
 
 
+def textured(face, material):
+    """A face with its texture; flat roofs have no windows, they show the texture's corner only."""
+    surface = polygon(face, TILES.get(material, 1.0))
+    if material in (*GLASS, *PLASTER) and surface.normals[0, 1] > 0.99:
+        surface.uvs = np.zeros_like(surface.uvs)
+    return surface
+
+
 def model():
     """Everything that can be seen: (solids with flat faces, quadrics)."""
     return [ground(), sky(), *buildings(), *lawns()], [*yellowjacket(), *balls_on_plaza()]
@@ -125,19 +133,23 @@ GLASS = {
     "red granite": dict(colour=(0.62, 0.30, 0.26), metallic=0.0),
 }
 
+#: Colours of the houses, which are diffuse.
+PLASTER = {"cream": (0.83, 0.76, 0.60), "rose": (0.80, 0.55, 0.46), "grey": (0.62, 0.64, 0.66)}
+
 #: Width in metres that one repeat of a material's texture covers.
-TILES = {"ground": PITCH, "sky": 6000.0, **dict.fromkeys(GLASS, 3.0)}
+TILES = {"ground": PITCH, "sky": 6000.0, **dict.fromkeys([*GLASS, *PLASTER], 3.0)}
 
 
 def make_materials(scene):
     """Every material, by name."""
     floors = scene.texture("floors", facade(64))
-    materials = {name: scene.material(name, roughness=0.04, texture=floors, **look) for name, look in GLASS.items()}
+    towers = {name: scene.material(name, roughness=0.04, texture=floors, **look) for name, look in GLASS.items()}
+    houses = {name: scene.material(name, colour, roughness=0.9, texture=floors) for name, colour in PLASTER.items()}
     return {
-        **materials,
+        **towers,
+        **houses,
         "ground": scene.material("ground", roughness=0.4, texture=scene.texture("plots", plot(256))),
         "sky": scene.material("sky", unlit=True, texture=scene.texture("sky", clouds(256))),
-        "plaster": scene.material("plaster", colour=(0.80, 0.72, 0.58), roughness=0.9),
         "lawn": scene.material("lawn", colour=(0.16, 0.34, 0.10), roughness=0.9),
         "yellow": scene.material("yellow", colour=(0.95, 0.66, 0.04), roughness=0.1),
         "black": scene.material("black", colour=(0.02, 0.02, 0.025), roughness=0.05),
@@ -260,7 +272,8 @@ def buildings():
     solids = []
     for n, (x, z) in enumerate(places[:HOUSES]):
         height = 3.5 + 4.0 * random.random_sample()
-        solids.append(Solid(f"House {n}", square(x, z, 4.0 + random.random_sample(), 0, height), "plaster"))
+        faces = square(x, z, 4.0 + random.random_sample(), 0, height)
+        solids.append(Solid(f"House {n}", faces, list(PLASTER)[n % len(PLASTER)]))
     for n, ((x, z), shape) in enumerate(zip(places[HOUSES:], shapes, strict=True)):
         back = (60 - z) / 175
         height = 11 + 26 * back + 16 * random.random_sample() ** 2
@@ -270,12 +283,13 @@ def buildings():
 
 
 def lawns():
-    """Five by five lawns on the plaza."""
-    places = [PLAZA + 9.0 * np.array([i, j]) for i in range(-2, 3) for j in range(-2, 3)]
-    h, y = 3.4, 0.04
+    """Lawns on the nine plots of the plaza: one large in the middle, four small on each plot at either side."""
+    plots = [PLAZA + PITCH * np.array([i, j]) for i in (-1, 1) for j in (-1, 0, 1)]
+    beds = [(PLAZA, 5.6), *((plot + 3 * np.array([a, b]), 2.6) for plot in plots for a in (-1, 1) for b in (-1, 1))]
+    y = 0.04
     return [
         Solid(f"Lawn {n}", [[(x - h, y, z + h), (x + h, y, z + h), (x + h, y, z - h), (x - h, y, z - h)]], "lawn")
-        for n, (x, z) in enumerate(places)
+        for n, ((x, z), h) in enumerate(beds)
     ]
 
 
@@ -327,7 +341,7 @@ def yellowjacket():
 
 def balls_on_plaza():
     """Two chrome balls at the plaza's front."""
-    places = [(-4, 2.2, 22), (26, 2.2, 18)]
+    places = [(7, 2.2, 22), (13.5, 2.2, 20)]
     return [
         Ellipsoid(f"Ball {n}", (2.2, 2.2, 2.2), np.eye(3), np.array(place, float), "chrome")
         for n, place in enumerate(places)

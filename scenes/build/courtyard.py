@@ -44,12 +44,12 @@ def make_materials(scene):
 
 def masonry(scene):
     """Paving, brick and plaster: textures with normal maps."""
-    edge, tone = courses(512, 8, 6, seed=11, jitter=0.5)
+    edge, tone = courses(512, 7, 5, seed=11, jitter=0.7)
     grain = noise(512, 8, seed=12, octaves=5)
-    stone = smoothstep(0.002, 0.012, edge)
+    stone = smoothstep(0.001, 0.006, edge)
     colour = ramp(0.65 * tone + 0.35 * grain, (0.45, 0.41, 0.36), (0.62, 0.57, 0.49), (0.73, 0.67, 0.58))
     colour = mix(np.full_like(colour, 0.27) * [1.0, 0.98, 0.85], colour, stone) * (0.84 + 0.32 * grain[..., None])
-    relief = 0.7 * smoothstep(0.0, 0.02, edge) + 0.3 * grain + 0.15 * tone
+    relief = 0.7 * smoothstep(0.0, 0.012, edge) + 0.35 * grain + 0.15 * tone
     # Worn stones are smoother than the joints between them.
     rough = np.stack([np.zeros_like(edge), 0.95 - 0.45 * stone * (0.5 + 0.5 * tone), np.zeros_like(edge)], axis=-1)
     paving = scene.material(
@@ -341,10 +341,9 @@ def tower(scene, materials):
     base, shaft_top, belfry_top = (6.5, -17.0), 12.5, 16.0
     shaft = box((-1.8, 0, -1.8), (1.8, shaft_top, 1.8), 2.0, skip="yY")
     band = join(box((-1.95, y, -1.95), (1.95, y + 0.25, 1.95)) for y in (9.0, shaft_top, belfry_top))
-    side = mesh.arch(2.0, 3.6, shaft_top + 1.6, belfry_top, 0.5, tile=2.0)
-    pier = box((-1.8, shaft_top, -0.5), (-1.0, shaft_top + 1.6, 0), 2.0, skip="yY")
-    side = join([side, pier, pier.moved((2.8, 0, 0))]).moved((0, 0, 1.8))
-    belfry = join(side.moved(turn=turn) for turn in (0, 90, 180, 270))
+    side = mesh.arch(2.0, 3.6, shaft_top + 1.6, belfry_top, 0.5, tile=2.0).moved((0, 0, 1.8))
+    pier = box((1.0, shaft_top, 1.0), (1.8, shaft_top + 1.6, 1.8), 2.0, skip="yY")
+    belfry = join(part.moved(turn=turn) for part in (side, pier) for turn in (0, 90, 180, 270))
     corners = [(-2.1, 16.2, 2.1), (2.1, 16.2, 2.1), (2.1, 16.2, -2.1), (-2.1, 16.2, -2.1)]
     spire = join(mesh.polygon([corners[i], corners[(i + 1) % 4], (0, 18.6, 0)], 1.0) for i in range(4))
     bell = lathe([(0.45, 0), (0.38, 0.15), (0.3, 0.45), (0.24, 0.65), (0.0, 0.75)], 24).moved((0, 13.6, 0))
