@@ -20,9 +20,7 @@ def _package():
     here = Path(__file__).resolve()
     sys.path[:] = [p for p in sys.path if Path(p or ".").resolve() != here.parent]
     sys.path.insert(0, str(here.parents[2]))
-    return importlib.import_module(f"{here.parents[1].name}.{here.parent.name}.job"), importlib.import_module(
-        f"{here.parents[1].name}.common.report"
-    )
+    return importlib.import_module(f"{here.parents[1].name}.{here.parent.name}.job"), importlib.import_module(f"{here.parents[1].name}.common.report")
 
 
 def _arguments(inside_blender: bool, argv: list[str]) -> argparse.Namespace:
@@ -48,7 +46,7 @@ def _pair(separator: str):
         sign = -1 if text.startswith("-") else 1
         first, found, second = text.lstrip("-").partition(separator)
         try:
-            if not found or sign < 0 and separator != "-":
+            if not found or (sign < 0 and separator != "-"):
                 raise ValueError
             return sign * int(first), int(second)
         except ValueError:
@@ -96,7 +94,7 @@ if __name__ == "__main__":
         code = main()
     except SystemExit as exit_:
         code = exit_.code if isinstance(exit_.code, int) else 2
-    except Exception as error:  # noqa: BLE001 - an artist gets one line; BUZZ_TRACEBACK=1 gives developers the rest
+    except Exception as error:
         if os.environ.get("BUZZ_TRACEBACK"):
             raise
         print(f"error: {type(error).__name__}: {error}; set BUZZ_TRACEBACK=1 and report this", file=sys.stderr)

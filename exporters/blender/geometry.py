@@ -1,8 +1,7 @@
 """Meshes as rendered, and how they change shape; written by Blender's own glTF exporter.
 
 Every distinct evaluated mesh becomes one temporary object in a temporary scene, which `io_scene_gltf2` exports with its
-materials. A mesh that changes shape keeps its key poses as shape keys (exported as morph targets): poses between which
-straight lines stay within `_TOLERANCE` of the mesh's size. A mesh whose vertices or faces change in number becomes
+materials. A mesh that changes shape keeps its key poses (see common/morph.py) as shape keys, exported as morph targets. A mesh whose vertices or faces change in number becomes
 several meshes, each visible while it lasts.
 """
 
@@ -14,11 +13,9 @@ from dataclasses import dataclass, field
 import bpy
 import numpy as np
 
+from ..common.morph import choose_targets
 from ..common.report import Lost
 from .prepare import is_animated
-
-_TOLERANCE = 2e-5
-_LONGEST = 32
 
 
 @dataclass
@@ -104,56 +101,16 @@ class GeometryStore:
         order = sorted(shape.poses, key=lambda n: samples[n])
         poses = np.stack([shape.poses[n] for n in order])
         times = samples[order]
-        base = poses[0]
-        extent = float(np.ptp(base.reshape(-1, 3), axis=0).max()) or 1.0
-        tolerance = _TOLERANCE * extent
-        if np.abs(poses - base).max() <= tolerance:
+        chosen = choose_targets(poses, times, np.sort(samples))
+        if chosen is None:
             return
-        keys = key_poses(poses, times, tolerance)
-        targets: list[np.ndarray] = []
-        which: list[int] = []
-        for k in keys:
-            if np.abs(poses[k] - base).max() <= tolerance:
-                which.append(-1)
-                continue
-            same = next((i for i, t in enumerate(targets) if np.abs(t - poses[k]).max() <= tolerance), None)
-            if same is None:
-                same = len(targets)
-                targets.append(poses[k])
-            which.append(same)
-        rows = np.zeros((len(keys), len(targets)))
-        for row, target in enumerate(which):
-            if target >= 0:
-                rows[row, target] = 1
-        when = np.sort(samples)
-        weights = np.stack([np.interp(when, times[keys], rows[:, t]) for t in range(len(targets))], axis=1)
-        shape.weights = weights
-        shape.mesh.vertices.foreach_set("co", base.reshape(-1))
+        numbers, shape.weights = chosen
+        shape.mesh.vertices.foreach_set("co", poses[0].reshape(-1))
         ob.shape_key_add(name="Basis", from_mix=False)
-        for i, target in enumerate(targets):
+        for i, number in enumerate(numbers):
             key = ob.shape_key_add(name=f"pose-{i}", from_mix=False)
-            key.data.foreach_set("co", target.reshape(-1))
+            key.data.foreach_set("co", poses[number].reshape(-1))
             key.value = 0.0
-
-
-def key_poses(poses: np.ndarray, times: np.ndarray, tolerance: float) -> list[int]:
-    """Indices of poses (n, values) such that straight lines between them stay within the tolerance of all others."""
-    keys = [0]
-    while keys[-1] < len(poses) - 1:
-        start = keys[-1]
-        end = start + 1
-        while end + 1 < len(poses) and end - start < _LONGEST and _straight(poses, times, start, end + 1, tolerance):
-            end += 1
-        keys.append(end)
-    return keys
-
-
-def _straight(poses: np.ndarray, times: np.ndarray, start: int, end: int, tolerance: float) -> bool:
-    for i in range(start + 1, end):
-        t = (times[i] - times[start]) / (times[end] - times[start])
-        if np.abs(poses[start] + (poses[end] - poses[start]) * t - poses[i]).max() > tolerance:
-            return False
-    return True
 
 
 def may_deform(ob: bpy.types.Object) -> bool:
