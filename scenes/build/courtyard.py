@@ -1,6 +1,6 @@
 """courtyard: a paved yard with an arcade, a fountain, a well and two lanterns, walked through in the afternoon sun.
 
-96 frames at 24 a second. The walk begins inside the gate, pans fast from the fountain to the well at frames 34-42, and
+96 frames at 24 a second. The walk begins inside the gate, pans fast from the fountain to the well at frames 33-43, and
 cuts at frame 60 to a low shot that rises beside the fountain.
 """
 
@@ -15,6 +15,7 @@ from texture import courses, mix, noise, normal_map, ramp, smoothstep
 
 FRAMES = 96
 CUT = 60
+PAN = (33, 43)
 
 #: The yard's inner walls stand at x = +-EAST and z = +-NORTH; north is -z.
 EAST, NORTH = 10.0, 8.0
@@ -319,7 +320,7 @@ def tile_column(tiles, length=0.42):
 def roofs(scene, materials):
     """Tiled slopes that fall towards the yard on three sides, and the lean-to over the arcade."""
     slope = mesh.rotation_x(24)
-    long = tile_column(9).transformed(slope)
+    long = tile_column(8).transformed(slope)
     short = tile_column(6).transformed(slope)
     board = box((-0.125, -0.16, -0.45), (0.125, -0.02, -0.02), 1.0, skip="xX")
     column_mesh = scene.mesh("Tile column", (long, materials["tiles"]), (board, materials["wood"]))
@@ -427,7 +428,7 @@ def tree(random):
     trunk = lathe([(0.2, 0), (0.13, 0.25), (0.1, 1.0), (0.085, 2.0), (0.05, 2.9)], 12)
     trunk.positions[:, 0] += 0.06 * np.sin(1.4 * trunk.positions[:, 1])
     centres = [(0, 3.1, 0), (0.55, 2.8, 0.3), (-0.5, 2.9, 0.35), (0.1, 2.75, -0.55), (-0.1, 3.6, 0.05)]
-    crown = [blob(random, 230, (0.75, 0.6, 0.75), c, 0.34) for c in centres]
+    crown = [blob(random, 210, (0.75, 0.6, 0.75), c, 0.34) for c in centres]
     return trunk, join(crown)
 
 
@@ -556,11 +557,10 @@ def move_camera(scene):
     """The walk with its fast pan, and after the cut the low shot."""
     walk = np.arange(CUT)
     eyes = camera.spline({0: (0.9, 1.65, 7.0), 20: (2.0, 1.7, 5.6), 40: (2.4, 1.7, 4.4), 59: (1.7, 1.62, 3.3)}, walk)
-    # Heading and pitch in degrees; the pan swings by 88 degrees in 8 frames.
-    heading = camera.spline(
-        {0: (-14, 2.5), 16: (-11, 2.0), 34: (-4, 0.5), 38: (42, -1.5), 42: (84, -2.5), 52: (87, -2), 59: (87, -1.5)},
-        walk,
-    )
+    # In degrees: a slow drift to the right, and the fast pan from the fountain to the well.
+    pan = smoothstep(PAN[0], PAN[1], walk)
+    heading = -14 + 0.17 * walk + 87 * pan
+    pitch = 2.5 - 0.05 * walk - 1.5 * pan
 
     low = np.arange(FRAMES - CUT)
     low_eyes = camera.spline({0: (-4.6, 0.9, 3.4), 18: (-3.9, 1.15, 4.2), 35: (-2.9, 1.55, 4.8)}, low)
@@ -568,7 +568,7 @@ def move_camera(scene):
 
     scene.shots(
         [
-            ("Walk", eyes, camera.quaternions(camera.look_along(*heading.T))),
+            ("Walk", eyes, camera.quaternions(camera.look_along(heading, pitch))),
             ("Low", low_eyes, camera.quaternions(camera.look_at(low_eyes, targets))),
         ],
         yfov=np.radians(48),
