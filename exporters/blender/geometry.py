@@ -1,8 +1,8 @@
 """Meshes as rendered, and how they change shape; written by Blender's own glTF exporter.
 
 Every distinct evaluated mesh becomes one temporary object in a temporary scene, which `io_scene_gltf2` exports with its
-materials. A mesh that changes shape keeps its key poses (see common/morph.py) as shape keys, exported as morph targets. A mesh whose vertices or faces change in number becomes
-several meshes, each visible while it lasts.
+materials. A mesh that changes shape keeps its key poses (see common/morph.py) as shape keys, exported as morph targets.
+A mesh whose vertices or faces change in number becomes several meshes, each visible while it lasts.
 """
 
 from __future__ import annotations

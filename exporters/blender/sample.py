@@ -148,8 +148,9 @@ class Sampler:
                 parent = instance.parent
                 key = (parent.name_full, ob.name_full, ob.data.name, *instance.persistent_id)
                 visible = parent.original.name_full not in self._hidden and not parent.hide_render
-                own = ob.original.name_full != parent.original.name_full
-                if own:
+                # Particles and geometry nodes show objects that are themselves hidden; collections and faces do not.
+                own = ob.original.name_full != parent.original.name_full and instance.particle_system is None
+                if own and parent.original.instance_type != "NONE":
                     visible = visible and not ob.hide_render and self._is_member(parent, ob)
             else:
                 key = (ob.name_full,)

@@ -18,29 +18,39 @@ def choose_targets(poses: np.ndarray, times: np.ndarray, samples: np.ndarray) ->
 
     The first pose is the mesh itself. None if nothing moves.
     """
+    if poses.shape[1] == 0:
+        return None
     base = poses[0]
     extent = float(np.ptp(base.reshape(-1, 3), axis=0).max()) or 1.0
     tolerance = TOLERANCE * extent
     if np.abs(poses - base).max() <= tolerance:
         return None
     keys = key_poses(poses, times, tolerance)
+    # The largest movements first: a pose on the straight line to a target that is already there needs none of its own.
     targets: list[int] = []
-    which = []
-    for k in keys:
-        if np.abs(poses[k] - base).max() <= tolerance:
-            which.append(-1)
+    found: dict[int, tuple[int, float]] = {}
+    for k in sorted(keys, key=lambda k: -float(np.abs(poses[k] - base).max())):
+        move = poses[k].astype(np.float64) - base
+        if np.abs(move).max() <= tolerance:
             continue
-        same = next((i for i, t in enumerate(targets) if np.abs(poses[t] - poses[k]).max() <= tolerance), None)
-        if same is None:
-            same = len(targets)
+        match = next((m for m in (_share(move, poses[t] - base, i, tolerance) for i, t in enumerate(targets)) if m), None)
+        if match is None:
             targets.append(k)
-        which.append(same)
+            match = (len(targets) - 1, 1.0)
+        found[k] = match
     rows = np.zeros((len(keys), len(targets)))
-    for row, target in enumerate(which):
-        if target >= 0:
-            rows[row, target] = 1
+    for row, k in enumerate(keys):
+        if k in found:
+            rows[row, found[k][0]] = found[k][1]
     weights = np.stack([np.interp(samples, times[keys], rows[:, t]) for t in range(len(targets))], axis=1)
     return targets, weights
+
+
+def _share(move: np.ndarray, target: np.ndarray, number: int, tolerance: float) -> tuple[int, float] | None:
+    """The share of a target that makes a movement, if it does."""
+    target = target.astype(np.float64)
+    share = float(np.dot(move, target) / np.dot(target, target))
+    return (number, share) if np.abs(move - share * target).max() <= tolerance else None
 
 
 def key_poses(poses: np.ndarray, times: np.ndarray, tolerance: float) -> list[int]:
