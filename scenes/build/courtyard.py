@@ -28,7 +28,7 @@ def build():
     """The whole scene."""
     scene = Scene("courtyard")
     materials = make_materials(scene)
-    for part in (ground, north_side, other_sides, roofs, tower, fountain, well, greenery, furniture, lanterns):
+    for part in (ground, buildings, roofs, tower, fountain, well, greenery, furniture, lanterns):
         part(scene, materials)
     scene.sun("Sun", direction=(0.55, -0.75, -0.42), watts_per_m2=4.2, colour=(1.0, 0.91, 0.78))
     move_camera(scene)
@@ -40,11 +40,11 @@ def build():
 
 def make_materials(scene):
     """Every material, by name."""
-    return {**masonry(scene), **stone_and_clay(scene), **wood_and_metal(scene), **living(scene)}
+    return {**masonry(scene), **plaster(scene), **stone_and_clay(scene), **wood_and_metal(scene), **living(scene)}
 
 
 def masonry(scene):
-    """Paving, brick and plaster: textures with normal maps."""
+    """Paving and brick: stones with a tone each and joints that lie lower."""
     edge, tone = courses(512, 7, 5, seed=11, jitter=0.7)
     grain = noise(512, 8, seed=12, octaves=5)
     stone = smoothstep(0.001, 0.006, edge)
@@ -72,18 +72,19 @@ def masonry(scene):
         texture=scene.texture("brick", colour),
         normal=scene.texture("brick_normal", normal_map(0.8 * smoothstep(0, 0.012, edge) + 0.3 * grain, 4.0)),
     )
+    return {"paving": paving, "brick": brick}
 
+
+def plaster(scene):
+    """One rough plaster in three colours."""
     stains, grain = noise(256, 3, seed=31, octaves=5), noise(256, 32, seed=35, octaves=3)
     colour = ramp(stains, (0.78, 0.58, 0.33), (0.89, 0.72, 0.46), (0.94, 0.81, 0.58)) * (0.93 + 0.14 * grain[..., None])
-    plaster_texture = scene.texture("plaster", colour)
-    plaster_normal = scene.texture("plaster_normal", normal_map(grain, 1.6))
-    plaster = {"texture": plaster_texture, "normal": plaster_normal, "roughness": 0.95}
+    maps = {"texture": scene.texture("plaster", colour)}
+    maps["normal"] = scene.texture("plaster_normal", normal_map(grain, 1.6))
     return {
-        "paving": paving,
-        "brick": brick,
-        "plaster": scene.material("Ochre plaster", **plaster),
-        "pale": scene.material("Pale plaster", colour=(0.95, 1.0, 1.15 / 1.2), **plaster),
-        "rose": scene.material("Rose plaster", colour=(1.0, 0.72, 0.62), **plaster),
+        "plaster": scene.material("Ochre plaster", roughness=0.95, **maps),
+        "pale": scene.material("Pale plaster", colour=(0.95, 1.0, 0.96), roughness=0.95, **maps),
+        "rose": scene.material("Rose plaster", colour=(1.0, 0.72, 0.62), roughness=0.95, **maps),
     }
 
 
@@ -108,11 +109,11 @@ def stone_and_clay(scene):
 
 def wood_and_metal(scene):
     """Doors, shutters, iron, brass, window glass and lamp bulbs."""
-    fibre = noise(256, 24, seed=71, octaves=3)
-    planks = np.abs(((np.arange(256) / 64) % 1) - 0.5)[None, :] * np.ones((256, 1))
-    fibre = np.roll(np.repeat(fibre[::8], 8, axis=0), 3, axis=0)
+    # Four planks side by side, their fibres upright.
+    fibre = np.repeat(noise(256, 24, seed=71, octaves=3)[::8], 8, axis=0)
     colour = ramp(fibre, (0.33, 0.20, 0.11), (0.51, 0.34, 0.20), (0.63, 0.45, 0.28))
-    wood = scene.texture("wood", colour * (0.35 + 0.65 * smoothstep(0.5, 0.46, planks))[..., None])
+    from_middle = np.abs(np.arange(256) / 64 % 1 - 0.5)
+    wood = scene.texture("wood", colour * (0.35 + 0.65 * smoothstep(0.5, 0.46, from_middle))[None, :, None])
     return {
         "wood": scene.material("Wood", texture=wood, roughness=0.6),
         "green wood": scene.material("Green wood", colour=(0.35, 0.85, 0.75), texture=wood, roughness=0.45),
@@ -173,16 +174,20 @@ def column():
     return join([box((-0.34, 0, -0.34), (0.34, 0.12, 0.34)), shaft, box((-0.34, 2.46, -0.34), (0.34, SPRING, 0.34))])
 
 
-def north_side(scene, materials):
+def buildings(scene, materials):
+    """The four sides of the yard, which share their windows and doors."""
+    window, door = window_mesh(scene, materials), door_mesh(scene, materials)
+    north_side(scene, materials, window, door)
+    other_sides(scene, materials, window, door)
+
+
+def north_side(scene, materials, window, door):
     """The arcade, the range behind it with its doors and windows, and the lean-to roof's ceiling."""
     pillar = scene.mesh("Column", (column(), materials["limestone"]))
     for i in range(BAYS + 1):
         scene.node(f"Column {i}", (-EAST + BAY * i, 0, -NORTH - 0.3), mesh=pillar)
-    # The vault's voussoirs: a thin limestone arch that stands out from the plaster.
     bay = mesh.arch(3.2, BAY, SPRING, ARCH_TOP, 0.5, tile=2.0)
-    trim = mesh.arch(3.2, 3.7, SPRING, SPRING + 1.85, 0.56, tile=1.0)
-    trim = _ring_only(trim, 1.62, 1.82).moved((0, 0, 0.03))
-    arch = scene.mesh("Arch", (bay, materials["plaster"]), (trim, materials["limestone"]))
+    arch = scene.mesh("Arch", (bay, materials["plaster"]), (moulding(1.62, 1.82), materials["limestone"]))
     for i in range(BAYS):
         scene.node(f"Arch {i}", (-EAST + BAY * (i + 0.5), 0, -NORTH - 0.05), mesh=arch)
 
@@ -190,36 +195,30 @@ def north_side(scene, materials):
     doors = [(1.3 + BAY * i, 0.0, 2.7 + BAY * i, 2.3) for i in range(BAYS)]
     upper = [(1.4 + BAY * i, 5.35, 2.6 + BAY * i, 6.75) for i in range(BAYS)]
     back = wall(2 * EAST, EAVE + 0.3, doors + upper, 0.25, tile=2.0).moved((-EAST, 0, z))
-    ceiling = quad((-EAST, ARCH_TOP - 0.4, z), (EAST, ARCH_TOP - 0.4, z), (EAST, ARCH_TOP - 0.4, -NORTH - 0.5),
-                   (-EAST, ARCH_TOP - 0.4, -NORTH - 0.5))  # fmt: skip
-    beams = [
-        box((x - 0.09, ARCH_TOP - 0.62, z), (x + 0.09, ARCH_TOP - 0.4, -NORTH - 0.5), skip="zZY")
-        for x in np.arange(-9.5, 9.6, 1.0)
-    ]
+    top, front = ARCH_TOP - 0.4, -NORTH - 0.5
+    ceiling = quad((-EAST, top, z), (EAST, top, z), (EAST, top, front), (-EAST, top, front))
+    beams = [box((x - 0.09, top - 0.22, z), (x + 0.09, top, front), skip="zZY") for x in np.arange(-9.5, 9.6, 1.0)]
     scene.node("North wall", mesh=scene.mesh("North wall", (back, materials["plaster"])))
     scene.node("Ceiling", mesh=scene.mesh("Ceiling", (join([ceiling, *beams]), materials["wood"])))
 
-    leaf, glazing = door_mesh(scene, materials), window_mesh(scene, materials)
     for i in range(BAYS):
-        scene.node(f"Door {i}", (-EAST + BAY * (i + 0.5), 0, z - 0.2), mesh=leaf)
-        scene.node(f"North window {i}", (-EAST + BAY * (i + 0.5), 5.35, z), mesh=glazing)
+        scene.node(f"Door {i}", (-EAST + BAY * (i + 0.5), 0, z - 0.2), mesh=door)
+        scene.node(f"North window {i}", (-EAST + BAY * (i + 0.5), 5.35, z), mesh=window)
 
 
-def _ring_only(arch, inner, outer):
-    """The part of an arch's faces between two radii about its centre, pushed out to make a moulding."""
-    curve_in, curve_out = mesh.arch_points(2 * inner, SPRING, 24), mesh.arch_points(2 * outer, SPRING, 24)
-    front_in = np.column_stack([curve_in, np.zeros(25)])
-    front_out = np.column_stack([curve_out, np.zeros(25)])
-    depth = np.array([0, 0, 0.06])
-    return join([mesh.strip(front_out, front_in), mesh.strip(front_out - depth, front_out)])
+def moulding(inner, outer, proud=0.03, segments=24):
+    """The limestone ring around an arch, between two radii, that stands out from the plaster."""
+    curves = [mesh.arch_points(2 * radius, SPRING, segments) for radius in (inner, outer)]
+    inside, outside = (np.column_stack([curve, np.full(segments + 1, proud)]) for curve in curves)
+    return join([mesh.strip(outside, inside), mesh.strip(outside - [0, 0, 2 * proud], outside)])
 
 
 def window_mesh(scene, materials):
     """A window 1.2 m by 1.4 m with panes, sill, lintel and open shutters; x centred, y from the sill, wall at z = 0."""
     pane = quad((-0.6, 0, -0.18), (0.6, 0, -0.18), (0.6, 1.4, -0.18), (-0.6, 1.4, -0.18))
-    bars = [(-0.6, 0.6, y, y + 0.06) for y in (0.0, 0.46, 0.9, 1.34)]
-    bars += [(x, x + 0.06, 0.0, 1.4) for x in (-0.6, -0.03, 0.54)]
-    frame = join(box((x0, y0, -0.18), (x1, y1, -0.12), skip="z") for x0, x1, y0, y1 in bars)
+    # The uprights stand a little proud: no two faces lie in one another.
+    bars = [box((-0.6, y, -0.18), (0.6, y + 0.06, -0.125), skip="z") for y in (0.0, 0.46, 0.9, 1.34)]
+    bars += [box((x, 0, -0.18), (x + 0.06, 1.4, -0.12), skip="z") for x in (-0.6, -0.03, 0.54)]
     trim = join([box((-0.75, -0.12, -0.1), (0.75, 0, 0.12)), box((-0.75, 1.4, -0.1), (0.75, 1.58, 0.05))])
     slats = [box((0.66, 0.02 + 0.115 * i, 0.03), (1.22, 0.10 + 0.115 * i, 0.06), 0.6, skip="z") for i in range(12)]
     shutter = join([box((0.62, 0, 0.015), (1.26, 1.4, 0.045), 0.6, skip="z"), *slats])
@@ -227,7 +226,7 @@ def window_mesh(scene, materials):
     return scene.mesh(
         "Window",
         (pane, materials["glass"]),
-        (frame, materials["white wood"]),
+        (join(bars), materials["white wood"]),
         (trim, materials["limestone"]),
         (shutters, materials["green wood"]),
     )
@@ -258,9 +257,8 @@ def door_mesh(scene, materials, width=1.4, height=2.3):
     )
 
 
-def other_sides(scene, materials):
+def other_sides(scene, materials, window, door):
     """East in brick, west in rose plaster, south a lower wall with the gate; each seen from inside the yard."""
-    glazing, door = window_mesh(scene, materials), door_mesh(scene, materials)
     length = 2 * NORTH + ARCADE_DEPTH
     low = [(2.4 + 4.2 * i, 1.1, 3.6 + 4.2 * i, 2.5) for i in (0, 1, 3)]
     high = [(2.4 + 4.2 * i, 4.8, 3.6 + 4.2 * i, 6.2) for i in range(4)]
@@ -276,7 +274,7 @@ def other_sides(scene, materials):
         scene.node(f"{name} wall", (x, 0, z), turn=turn, mesh=parts)
         inward = -np.sign(x)
         for i, (x0, y0, x1, _) in enumerate(low + high):
-            scene.node(f"{name} window {i}", (x, y0, z + along * (x0 + x1) / 2), turn=turn, mesh=glazing)
+            scene.node(f"{name} window {i}", (x, y0, z + along * (x0 + x1) / 2), turn=turn, mesh=window)
         middle = z + along * (doorway[0] + doorway[2]) / 2
         scene.node(f"{name} door", (x - 0.2 * inward, 0, middle), turn=turn, mesh=door)
 
