@@ -155,7 +155,14 @@ def make_materials(scene):
         "black": scene.material("black", colour=(0.02, 0.02, 0.025), roughness=0.05),
         "white": scene.material("white", colour=(0.9, 0.9, 0.9), roughness=0.1),
         "chrome": scene.material("chrome", colour=(0.9, 0.9, 0.92), metallic=1.0, roughness=0.02),
-        "wing": scene.material("wing", colour=(0.90, 0.95, 1.0), roughness=0.0, ior=1.3, transmission=0.9),
+        "wing": scene.material(
+            "wing",
+            colour=(0.90, 0.95, 1.0),
+            roughness=0.0,
+            ior=1.3,
+            transmission=0.9,
+            attenuation=((0.75, 0.88, 1.0), 1.0),
+        ),
     }
 
 

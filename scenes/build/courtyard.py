@@ -548,7 +548,24 @@ def lanterns(scene, materials):
         scene.lamp(f"Lamp {name}", place + [0, -0.02, 0], watts=160, colour=(1.0, 0.68, 0.36))
 
 
-# ---- camera
+# ---- sky and camera
+
+
+def sky(rows):
+    """An equirectangular summer sky, deep blue at the zenith and pale at the horizon, and warm ground below it.
+
+    The columns begin towards -x and go round over -z, +x and +z, as `scene.extras.buzz.world` has it.
+    """
+    y, x = np.mgrid[0:rows, 0 : 2 * rows] + 0.5
+    elevation, azimuth = np.pi / 2 - y / rows * np.pi, (x / rows - 1) * np.pi
+    blue = ramp(np.sin(np.clip(elevation, 0, None)) ** 0.6, (0.83, 0.90, 0.96), (0.55, 0.73, 0.93), (0.27, 0.48, 0.80))
+    # Clouds lie on a plane overhead that the eye sees foreshortened; the noise repeats, so any distance will do.
+    reach = 140 * np.cos(elevation) / (np.sin(np.clip(elevation, 0, None)) + 0.12)
+    column, row = (np.floor(reach * part).astype(int) % 512 for part in (np.cos(azimuth), np.sin(azimuth)))
+    cover = smoothstep(0.50, 0.72, noise(512, 4, seed=141, octaves=6))[row, column]
+    cover = 0.85 * cover * smoothstep(0.02, 0.30, elevation)
+    above = mix(blue, np.full_like(blue, 0.97), cover)
+    return mix(np.ones_like(above) * [0.50, 0.45, 0.38], above, smoothstep(-0.02, 0.0, elevation))
 
 
 def move_camera(scene):
@@ -572,5 +589,5 @@ def move_camera(scene):
         yfov=np.radians(48),
         fps=24,
         resolution=(1280, 720),
-        world={"color": [0.36, 0.52, 0.80], "strength": 1.0},
+        world={"strength": 1.15, "image": scene.picture("sky", sky(256), step=1)},
     )

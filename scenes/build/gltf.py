@@ -43,10 +43,15 @@ class Scene:
 
     # ---- images and materials
 
-    def texture(self, name, image, step=4):
-        """Adds a repeating, mip-mapped texture, saved as textures/<name>.png; returns its index."""
+    def picture(self, name, image, step=4):
+        """Adds the file textures/<name>.png; returns its URI."""
         uri = f"textures/{name}.png"
         self.images[uri] = encode_png(image, step)
+        return uri
+
+    def texture(self, name, image, step=4):
+        """Adds a picture as a repeating, mip-mapped texture; returns its index."""
+        uri = self.picture(name, image, step)
         if "samplers" not in self.document:
             linear_mipmap, linear, repeat = 9987, 9729, 10497
             self._add(
