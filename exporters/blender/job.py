@@ -134,7 +134,7 @@ class _Export:
         bpy.context.window.scene = self.scene
         self._collect(document, sampler)
         textures = self.work / f"{self.path.stem}_textures"
-        if textures.is_dir():
+        if textures.is_dir() and any(textures.iterdir()):
             shutil.rmtree(self.path.parent / textures.name, ignore_errors=True)
             shutil.move(textures, self.path.parent / textures.name)
         return document

@@ -100,13 +100,15 @@ def _environment(node: bpy.types.Node) -> tuple[bpy.types.Image, float] | None:
 
 def _put_image(image: bpy.types.Image, folder: Path, stem: str) -> str | None:
     """Copy or write the environment image beside the glTF; its file name. None if it has no pixels."""
-    # Asking for the size makes Blender load the file.
-    if not image.size[0]:
-        return None
+    # Asking for the size makes Blender load the file, and only then does it know its colour space.
+    _ = image.size[0]
     suffix = Path(image.filepath_raw or image.name).suffix.lower()
     linear = image.colorspace_settings.name.startswith(("Linear", "scene_linear"))
     eight_bit = suffix in (".png", ".jpg", ".jpeg")
     source = Path(bpy.path.abspath(image.filepath_raw, library=image.library)) if image.filepath_raw else None
+    missing = image.source == "FILE" and not image.packed_file and not (source and source.is_file())
+    if missing or not image.size[0]:
+        return None
     if image.source == "FILE" and suffix in _READABLE and eight_bit != linear:
         target = folder / f"{stem}_world{suffix}"
         if image.packed_file:
