@@ -10,8 +10,8 @@ use buzz::error::Error;
 use buzz::frame::{FrameKind, FrameStats};
 use buzz::infer::BuzzBuffer;
 use buzz::output::{
-    Compression, ExrSink, FileOptions, FrameFile, FrameRecord, KeyFrame, NamePattern, OutputFolder, PlanSummary, Report,
-    ReportInput, RunSeconds, SceneSummary, SegmentRange, SettingsHash, SettingsHasher, SettingsSummary, peak_bytes,
+    self, Compression, ExrSink, FileOptions, FrameFile, FrameRecord, KeyFrame, NamePattern, OutputFolder,
+    Report, ReportInput, RunSeconds, SceneSummary, SegmentRange, SettingsHash, SettingsHasher, peak_bytes,
 };
 use buzz::plan::Plan;
 use buzz::scene::Requirements;
@@ -24,7 +24,8 @@ use std::time::Instant;
 pub fn run(args: ConvertArgs) -> Result<ExitCode> {
     let start = Instant::now();
     let signal = interrupt::watch()?;
-    let names = NamePattern::parse(args.output.name.as_deref().unwrap_or(NamePattern::DEFAULT), &stem(&args.input))?;
+    let names =
+        NamePattern::parse(args.output.name.as_deref().unwrap_or(NamePattern::DEFAULT), &stem(&args.input))?;
     let asked = args.output.frames.as_deref().map(parse::frames).transpose()?;
     let mut job = Job::new(&args.input, &args.scene, &args.image)?;
     warn_of_ignored(&job.scene);
@@ -35,14 +36,19 @@ pub fn run(args: ConvertArgs) -> Result<ExitCode> {
     let hash = settings_hash(&job, &args);
     let folder = OutputFolder::open(&args.out_dir, names, frames.iter().copied())?;
     let skipped = existing(&folder, &frames, &hash, &args)?;
-    let to_render: BTreeSet<i64> = frames.difference(&skipped.iter().map(|r| r.number).collect()).copied().collect();
+    let to_render: BTreeSet<i64> =
+        frames.difference(&skipped.iter().map(|r| r.number).collect()).copied().collect();
 
     let planning = Instant::now();
     let plan = job.plan();
     let plan_seconds = planning.elapsed().as_secs_f64();
 
-    let options =
-        FileOptions { compression: compression(args.output.compression), fps: timing.fps, quality: job.quality.name().into(), settings_hash: hash };
+    let options = FileOptions {
+        compression: compression(args.output.compression),
+        fps: timing.fps,
+        quality: job.quality.name().into(),
+        settings_hash: hash,
+    };
     let mut sink = ExrSink::new(folder, options)?;
     let pixels = job.settings.window.pixels() as u64;
     let progress = Progress::new(args.output.progress, to_render.len(), pixels, signal);
@@ -61,7 +67,9 @@ pub fn run(args: ConvertArgs) -> Result<ExitCode> {
     }
     records.sort_by_key(|r| r.number);
     for (frame, values) in sink.repaired() {
-        eprintln!("buzz-convert: warning: frame {frame}: {values} values were not finite or too large for their channel and were replaced");
+        eprintln!(
+            "buzz-convert: warning: frame {frame}: {values} values were not finite or too large for their channel and were replaced"
+        );
     }
 
     let seconds = RunSeconds {
@@ -73,7 +81,7 @@ pub fn run(args: ConvertArgs) -> Result<ExitCode> {
     let report = report(&args, &job, &plan, records, seconds);
     let whole = frames == (timing.first..=timing.last).collect();
     let path = args.output.report.clone().unwrap_or_else(|| default_report(&args, &frames, whole));
-    report.write(&path)?;
+    report.write_json(&path)?;
     summarise(&report);
     Ok(ExitCode::SUCCESS)
 }
@@ -85,7 +93,9 @@ fn choose_image(job: &mut Job, args: &ConvertArgs) -> Result<()> {
         settings.window = parse::crop(text, (settings.width, settings.height))?;
     }
     if !args.output.exposure.is_finite() {
-        return Err(Error::Usage(format!("--exposure {}: expected a number of stops", args.output.exposure)).into());
+        return Err(
+            Error::Usage(format!("--exposure {}: expected a number of stops", args.output.exposure)).into()
+        );
     }
     settings.aovs = parse::aovs(&args.output.aov)?;
     settings.transparent = args.output.transparent;
@@ -170,17 +180,24 @@ impl Observer for Recorder {
     }
 }
 
-fn report(args: &ConvertArgs, job: &Job, plan: &Plan, frames: Vec<FrameRecord>, seconds: RunSeconds) -> Report {
+fn report(
+    args: &ConvertArgs,
+    job: &Job,
+    plan: &Plan,
+    frames: Vec<FrameRecord>,
+    seconds: RunSeconds,
+) -> Report {
     let scene = &job.scene;
-    let keyframes = plan.keyframes.iter().map(|k| KeyFrame { frame: k.frame, reason: k.reason.name().into() });
+    let keyframes =
+        plan.keyframes.iter().map(|k| KeyFrame { frame: k.frame, reason: k.reason.name().into() });
     let segments = plan.segments.iter().map(|s| SegmentRange { key: s.key, first: s.first, last: s.last });
     Report::new(ReportInput {
         input: args.input.display().to_string(),
-        settings: SettingsSummary {
+        settings: output::Settings {
             quality: job.quality.name().into(),
             width: job.settings.width,
             height: job.settings.height,
-            fps: SettingsSummary::fps(scene.timing.fps),
+            fps: output::Settings::fps(scene.timing.fps),
             threads: job.threads,
             aa: 1,
         },
@@ -193,7 +210,11 @@ fn report(args: &ConvertArgs, job: &Job, plan: &Plan, frames: Vec<FrameRecord>, 
             ignored: scene.ignored.iter().map(Into::into).collect(),
             bytes_per_pixel: BuzzBuffer::bytes_per_pixel(scene.lights.len()),
         },
-        plan: PlanSummary { keyframes: keyframes.collect(), segments: segments.collect(), cuts: plan.cuts.clone() },
+        plan: output::Plan {
+            keyframes: keyframes.collect(),
+            segments: segments.collect(),
+            cuts: plan.cuts.clone(),
+        },
         frames,
         seconds,
         peak_bytes: peak_bytes(),

@@ -34,7 +34,9 @@ fn as_json(scene: &Scene) -> Value {
     let needs = Requirements::of(scene);
     let cameras = scene.cameras.iter().map(|c| match c.lens.projection {
         Projection::Perspective { yfov } => json!({"name": c.name, "type": "perspective", "yfov": yfov}),
-        Projection::Orthographic { ymag, .. } => json!({"name": c.name, "type": "orthographic", "ymag": ymag}),
+        Projection::Orthographic { ymag, .. } => {
+            json!({"name": c.name, "type": "orthographic", "ymag": ymag})
+        }
     });
     let lights = scene.lights.iter().map(|l| json!({"name": l.name, "type": light_kind(&l.kind)}));
     let animations = scene.channels.iter().map(|c| {

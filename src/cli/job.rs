@@ -39,7 +39,8 @@ impl Job {
             renumber(&mut scene, first);
         }
         let own = scene.timing.resolution.unwrap_or((1280, 720));
-        let (width, height) = image.resolution.as_deref().map_or(Ok(own), |text| parse::resolution(text, own))?;
+        let (width, height) =
+            image.resolution.as_deref().map_or(Ok(own), |text| parse::resolution(text, own))?;
         let mut settings = Settings::new(width, height);
         settings.camera = scene_args.camera.as_deref().map(|name| find_camera(&scene, name)).transpose()?;
         let start = Instant::now();
@@ -79,7 +80,10 @@ pub fn read(input: &Path, args: &SceneArgs) -> Result<Scene> {
 /// Says once what of the scene is not rendered.
 pub fn warn_of_ignored(scene: &Scene) {
     for ignored in &scene.ignored {
-        eprintln!("buzz-convert: warning: {}: {} is not rendered: {}", ignored.place, ignored.feature, ignored.effect);
+        eprintln!(
+            "buzz-convert: warning: {}: {} is not rendered: {}",
+            ignored.place, ignored.feature, ignored.effect
+        );
     }
 }
 
@@ -120,7 +124,8 @@ fn find_camera(scene: &Scene, name: &str) -> Result<usize> {
     let by_name = scene.cameras.iter().position(|c| c.name == name);
     let by_index = || name.parse::<usize>().ok().filter(|&i| i < scene.cameras.len());
     by_name.or_else(by_index).ok_or_else(|| {
-        let names: Vec<String> = scene.cameras.iter().enumerate().map(|(i, c)| format!("{i} {}", c.name)).collect();
+        let names: Vec<String> =
+            scene.cameras.iter().enumerate().map(|(i, c)| format!("{i} {}", c.name)).collect();
         Error::Usage(format!("--camera {name}: the scene has {}", names.join(", "))).into()
     })
 }

@@ -42,7 +42,8 @@ fn dispatch(cli: Cli) -> Result<ExitCode> {
         (Some(Command::Compare(args)), _) => compare::run(args),
         (None, Some(args)) => convert::run(args),
         (None, None) => {
-            let error = Cli::command().error(ErrorKind::MissingRequiredArgument, "INPUT and OUT_DIR are missing");
+            let error =
+                Cli::command().error(ErrorKind::MissingRequiredArgument, "INPUT and OUT_DIR are missing");
             error.exit()
         }
     }

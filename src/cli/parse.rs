@@ -18,12 +18,17 @@ pub fn frames(text: &str) -> Result<BTreeSet<i64>> {
     let mut found = BTreeSet::new();
     for part in text.split(',') {
         let (range, step) = match part.split_once(['x', ':']) {
-            Some((range, step)) => (range, step.trim().parse::<i64>().ok().filter(|&s| s > 0).ok_or_else(error)?),
+            Some((range, step)) => {
+                (range, step.trim().parse::<i64>().ok().filter(|&s| s > 0).ok_or_else(error)?)
+            }
             None => (part, 1),
         };
         let range = range.trim();
         // The dash that divides is the first one after a digit; any other is a sign.
-        let dash = range.char_indices().skip(1).find(|&(i, c)| c == '-' && range[..i].ends_with(|c: char| c.is_ascii_digit()));
+        let dash = range
+            .char_indices()
+            .skip(1)
+            .find(|&(i, c)| c == '-' && range[..i].ends_with(|c: char| c.is_ascii_digit()));
         let (first, last) = match dash {
             Some((i, _)) => (&range[..i], &range[i + 1..]),
             None => (range, range),
@@ -82,10 +87,16 @@ pub fn resolution(text: &str, own: (u32, u32)) -> Result<(u32, u32)> {
 /// `x,y,width,height` inside `full`.
 pub fn crop(text: &str, full: (u32, u32)) -> Result<Window> {
     let error = || usage("--crop", text, &format!("x,y,width,height inside {}x{}", full.0, full.1));
-    let numbers = text.split(',').map(|s| s.trim().parse::<u32>().map_err(|_| error())).collect::<Result<Vec<_>>>()?;
+    let numbers =
+        text.split(',').map(|s| s.trim().parse::<u32>().map_err(|_| error())).collect::<Result<Vec<_>>>()?;
     let &[x, y, width, height] = numbers.as_slice() else { return Err(error()) };
-    let fits = |at: u32, size: u32, full: u32| size > 0 && at.checked_add(size).is_some_and(|end| end <= full);
-    if fits(x, width, full.0) && fits(y, height, full.1) { Ok(Window { x, y, width, height }) } else { Err(error()) }
+    let fits =
+        |at: u32, size: u32, full: u32| size > 0 && at.checked_add(size).is_some_and(|end| end <= full);
+    if fits(x, width, full.0) && fits(y, height, full.1) {
+        Ok(Window { x, y, width, height })
+    } else {
+        Err(error())
+    }
 }
 
 /// A comma list of layers.
@@ -121,7 +132,11 @@ pub fn aovs(text: &str) -> Result<AovSet> {
 pub fn segment(text: &str) -> Result<u32> {
     match text {
         "auto" => Ok(buzz::plan::LONGEST_SEGMENT),
-        _ => text.parse().ok().filter(|&n| n > 0).ok_or_else(|| usage("--segment", text, "auto or a number of frames")),
+        _ => text
+            .parse()
+            .ok()
+            .filter(|&n| n > 0)
+            .ok_or_else(|| usage("--segment", text, "auto or a number of frames")),
     }
 }
 
@@ -147,7 +162,13 @@ mod tests {
 
     #[test]
     fn decimal_ntsc_rates_are_exact() {
-        for (text, n, d) in [("24", 24, 1), ("23.976", 24000, 1001), ("29.97", 30000, 1001), ("24000/1001", 24000, 1001), ("12.5", 12500, 1000)] {
+        for (text, n, d) in [
+            ("24", 24, 1),
+            ("23.976", 24000, 1001),
+            ("29.97", 30000, 1001),
+            ("24000/1001", 24000, 1001),
+            ("12.5", 12500, 1000),
+        ] {
             assert_eq!(fps(text).unwrap(), Rational { numerator: n, denominator: d });
         }
         for bad in ["0", "-1", "24/0", "x", "nan", "inf"] {

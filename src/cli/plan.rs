@@ -41,7 +41,8 @@ fn frame_as_json(job: &Job, planned: &buzz::plan::PlannedFrame) -> Value {
     let camera = scene.camera_at(planned.frame, job.settings.camera);
     let view = scene.view(&pose, camera, job.settings.width, job.settings.height);
     // glTF's camera looks along -Z, so the third column is where it looks away from.
-    let columns = [view.right.extend(0.0), view.up.extend(0.0), (-view.forward).extend(0.0), view.eye.extend(1.0)];
+    let columns =
+        [view.right.extend(0.0), view.up.extend(0.0), (-view.forward).extend(0.0), view.eye.extend(1.0)];
     let matrix: Vec<f64> = columns.iter().flat_map(|c| c.to_array()).collect();
     let (yfov, ymag) = match view.lens.projection {
         Projection::Perspective { yfov } => (Some(yfov), None),

@@ -80,7 +80,8 @@ impl Progress {
     }
 
     fn say(&self, number: i64, kind: FrameKind, stats: &FrameStats) {
-        let saved = self.tally.saved().map(|s| format!("{:.1} % of rays saved", s * 100.0)).unwrap_or_default();
+        let saved =
+            self.tally.saved().map(|s| format!("{:.1} % of rays saved", s * 100.0)).unwrap_or_default();
         let how = match kind {
             FrameKind::Traced => "traced".to_owned(),
             FrameKind::Inferred { from } => format!("inferred from {from}"),

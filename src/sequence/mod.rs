@@ -9,13 +9,15 @@ pub use path::camera_path;
 
 use crate::accel::Accel;
 use crate::error::{Error, Result};
-use crate::frame::{Aov, AovSet, Frame, FrameKind, FrameStats, PixelClass, RayCounts, StageSeconds, SurfaceSample, Window};
+use crate::frame::{
+    Aov, AovSet, Frame, FrameKind, FrameStats, PixelClass, RayCounts, StageSeconds, SurfaceSample, Window,
+};
 use crate::infer::{BuzzBuffer, CastRays, Inference, Projector};
 use crate::plan::{Plan, Segment};
 use crate::scene::{Pose, Scene, View};
 use crate::trace::{TraceOptions, Tracer};
 use glam::DVec3;
-use resolve::{Resolver, count_hidden, empty_frame};
+use resolve::{Neighbour, Resolver, count_hidden, empty_frame};
 use std::collections::BTreeSet;
 use std::time::Instant;
 
@@ -176,9 +178,11 @@ fn render_segment(
     let pose = scene.pose(scene.timing.time_of(segment.key));
     let origin = shot(scene, settings, segment.key).view.eye;
     accel.place(scene, &pose, origin);
+    let accel = &*accel;
     let tracer = Tracer::new(scene, accel, &pose, TraceOptions { bounces: settings.bounces });
     buffers.fit(settings.window, tracer.lit_words());
-    let mut emitter = Emitter { scene, settings, tracer: &tracer, origin, cuts, wanted, sink, observer };
+    let mut emitter =
+        Emitter { scene, settings, accel, tracer: &tracer, origin, cuts, wanted, sink, observer };
     let Buffers { key, old, new, inference } = buffers;
 
     let key_shot = shot(scene, settings, segment.key);
@@ -249,6 +253,7 @@ impl CastRays for Caster<'_> {
 struct Emitter<'a> {
     scene: &'a Scene,
     settings: &'a Settings,
+    accel: &'a Accel,
     tracer: &'a Tracer<'a>,
     origin: DVec3,
     cuts: &'a [i64],
@@ -299,11 +304,14 @@ impl Emitter<'_> {
     }
 
     /// The frame next to `shot`, for motion; none across a cut or outside the range.
-    fn neighbour(&self, shot: &Shot, number: i64, is_cut: bool) -> Option<Shot> {
+    fn neighbour(&self, shot: &Shot, number: i64, is_cut: bool) -> Option<Neighbour> {
         let timing = &self.scene.timing;
         let wanted = self.settings.aovs.contains(Aov::Motion) && !is_cut;
         let inside = (timing.first..=timing.last).contains(&number);
         let other = (wanted && inside).then(|| self::shot(self.scene, self.settings, number));
-        other.filter(|o| o.camera == shot.camera)
+        other.filter(|o| o.camera == shot.camera).map(|o| {
+            let moved = !self.scene.looks_alike(&shot.pose, &o.pose);
+            Neighbour { view: o.view, surfaces: moved.then(|| self.accel.displaced(self.scene, &o.pose)) }
+        })
     }
 }

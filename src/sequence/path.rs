@@ -1,7 +1,7 @@
 //! The camera's path as the planner wants it.
 
 use super::Settings;
-use crate::accel::Accel;
+use crate::accel::{Accel, Sides};
 use crate::plan::{PathFrame, ProbePoint};
 use crate::scene::{Pose, Scene, View};
 use rayon::prelude::*;
@@ -16,8 +16,8 @@ pub fn camera_path(scene: &Scene, accel: &mut Accel, settings: &Settings) -> Vec
         let view = scene.view(&pose, camera, settings.width, settings.height);
         // Nothing is known about the frame before the first; its pose counts as the same.
         let scene_changed = before.as_ref().is_some_and(|b| !scene.looks_alike(b, &pose));
-        let far_from_origin = (view.eye - accel.origin()).length() > 0.0;
-        if before.is_none() || scene_changed || far_from_origin {
+        // The probe is coarse: it may keep the first eye for its origin.
+        if before.is_none() || scene_changed {
             accel.place(scene, &pose, view.eye);
         }
         path.push(PathFrame { frame, view, probe: probe(scene, accel, &view), scene_changed });
@@ -31,14 +31,10 @@ fn probe(scene: &Scene, accel: &Accel, view: &View) -> Vec<ProbePoint> {
     let cast = |&(x, y): &(f64, f64)| {
         let ray = view.ray(x, y);
         let origin = (ray.origin - accel.origin()).as_vec3();
-        match accel.nearest_surface(
-            scene,
-            origin,
-            ray.direction.as_vec3(),
-            view.lens.near as f32,
-            view.lens.far as f32,
-        ) {
-            Some(t) => ProbePoint { position: ray.origin + ray.direction * f64::from(t), z: f64::from(t) },
+        let (near, far) = (view.lens.near as f32, view.lens.far as f32);
+        let hit = accel.intersect(scene, origin, ray.direction.as_vec3(), near, far, Sides::Visible);
+        match hit.map(|h| f64::from(h.t)) {
+            Some(z) => ProbePoint { position: ray.origin + ray.direction * z, z },
             None => ProbePoint { position: ray.direction, z: f64::INFINITY },
         }
     };
@@ -47,7 +43,7 @@ fn probe(scene: &Scene, accel: &Accel, view: &View) -> Vec<ProbePoint> {
 
 impl Scene {
     /// True if the two poses differ in nothing that is seen but cameras.
-    fn looks_alike(&self, a: &Pose, b: &Pose) -> bool {
+    pub(super) fn looks_alike(&self, a: &Pose, b: &Pose) -> bool {
         let placed = |i: &crate::scene::Instance| {
             let still = |n: usize| a.world_from_node[n] == b.world_from_node[n];
             let joints_still = i.skin.is_none_or(|s| self.skins[s].joints.iter().all(|&j| still(j)));

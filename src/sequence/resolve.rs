@@ -1,11 +1,12 @@
 //! From samples to a frame's layers: the paper's enhancement of every pixel, traced or reused alike.
 
 use super::{Settings, Shot};
+use crate::accel::Displaced;
 use crate::frame::{Aov, Frame, FrameKind, FrameStats, RayCounts, SurfaceSample, Window};
 use crate::infer::BuzzBuffer;
 use crate::scene::{Scene, View};
 use crate::trace::Tracer;
-use glam::{DVec3, Vec3};
+use glam::{DVec3, DVec4, Vec3};
 use rayon::prelude::*;
 
 /// Everything that a pixel's final values depend on besides its sample.
@@ -17,9 +18,9 @@ pub(super) struct Resolver<'a> {
     pub origin: DVec3,
     pub shot: &'a Shot,
     /// The frame after, where motion is asked for and there is one.
-    pub next: Option<Shot>,
+    pub next: Option<Neighbour>,
     /// The frame before.
-    pub previous: Option<Shot>,
+    pub previous: Option<Neighbour>,
 }
 
 /// The layers of one pixel that come from shading.
@@ -127,17 +128,18 @@ impl Resolver<'_> {
 
     /// Pixels, x right and y up, that the sample moves on the image between this frame and `other`, in the direction
     /// of time: `sign` is 1 if `other` is later, -1 if it is earlier.
-    fn motion(&self, sample: &SurfaceSample, other: Option<&Shot>, sign: f32) -> [f32; 2] {
+    fn motion(&self, sample: &SurfaceSample, other: Option<&Neighbour>, sign: f32) -> [f32; 2] {
         let Some(other) = other else { return [0.0; 2] };
+        let here = sample.position.as_dvec3();
         let (here, there) = if sample.surface.is_background() {
-            let direction = sample.position.as_dvec3().extend(0.0);
-            (direction, direction)
+            (here.extend(0.0), here.extend(0.0))
         } else {
-            let here = sample.position.as_dvec3() + self.origin;
-            (here.extend(1.0), self.moved(sample, here, other).extend(1.0))
+            let there =
+                other.surfaces.as_ref().map_or(sample.position, |s| s.point(self.scene, sample.surface));
+            (here.extend(1.0), there.as_dvec3().extend(1.0))
         };
-        let raster = |view: &View, p| {
-            let r = view.raster_from_world(DVec3::ZERO) * p;
+        let raster = |view: &View, p: DVec4| {
+            let r = view.raster_from_world(self.origin) * p;
             (r.w > 0.0).then(|| (r.x / r.w, r.y / r.w))
         };
         match (raster(&self.shot.view, here), raster(&other.view, there)) {
@@ -145,17 +147,13 @@ impl Resolver<'_> {
             _ => [0.0; 2],
         }
     }
+}
 
-    /// Where the surface point is in another frame's pose.
-    fn moved(&self, sample: &SurfaceSample, here: DVec3, other: &Shot) -> DVec3 {
-        let instance = &self.scene.instances[sample.surface.instance as usize];
-        if self.scene.is_deformed(instance) {
-            return self.scene.surface_position(&other.pose, sample.surface);
-        }
-        let (now, then) =
-            (self.shot.pose.world_from_node[instance.node], other.pose.world_from_node[instance.node]);
-        if now == then { here } else { then * now.inverse().transform_point3(here) }
-    }
+/// The frame before or after, as motion needs it.
+pub(super) struct Neighbour {
+    pub view: View,
+    /// Where surfaces are then; none where nothing but the camera moves.
+    pub surfaces: Option<Displaced>,
 }
 
 /// One row of the layers that shading fills; empty where not asked for.
