@@ -67,9 +67,9 @@ impl Deformed {
             tangents.iter_mut().zip(&target.tangents).for_each(|(t, &d)| *t += (d * weight).extend(0.0));
         }
         if let Some((&own, joints)) = shape.joints.split_last() {
-            for i in 0..positions.len() {
+            for (i, position) in positions.iter_mut().enumerate() {
                 let m = blend(mesh, joints, own, i);
-                positions[i] = m.transform_point3(positions[i]);
+                *position = m.transform_point3(*position);
                 if let Some(n) = normals.get_mut(i) {
                     *n = cofactor(m.matrix3) * *n;
                 }

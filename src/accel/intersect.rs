@@ -58,7 +58,7 @@ impl Accel {
             self.nearest_in(scene, &self.placed[slot], ray, sides, &mut nearest);
             nearest.hit.t
         });
-        (nearest.instance != SurfaceRef::NONE).then(|| RayHit {
+        (nearest.instance != SurfaceRef::NONE).then_some(RayHit {
             t: nearest.hit.t * self.unit,
             surface: SurfaceRef {
                 instance: nearest.instance,

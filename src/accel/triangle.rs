@@ -102,7 +102,7 @@ impl ShearedRay {
         }
         let inverse = 1.0 / sum;
         let t = (wa * a[2] + wb * b[2] + wc * c[2]) * inverse * sz;
-        (t >= t_min && t <= t_max).then(|| TriangleHit {
+        (t >= t_min && t <= t_max).then_some(TriangleHit {
             t,
             u: wb * inverse,
             v: wc * inverse,

@@ -355,7 +355,7 @@ mod tests {
     }
 
     fn checker(size: u32) -> Image {
-        let texel = |i: u32| if (i % size + i / size) % 2 == 0 { [255; 4] } else { [0, 0, 0, 255] };
+        let texel = |i: u32| if (i % size + i / size).is_multiple_of(2) { [255; 4] } else { [0, 0, 0, 255] };
         let texels = (0..size * size).map(texel).collect();
         Image::from_rgba8("checker", size, size, texels, ColorSpace::Srgb)
     }
