@@ -35,11 +35,14 @@ CORNER = np.array([-75.0, -115.0])
 PLAZA = np.array([10.0, 4.0])
 BUZZ = np.array([10.0, 13.0, 4.0])
 
-#: How many towers of each shape; the faces of each are counted in `TOWERS`.
-TOWER_COUNTS = {"stepped": 10, "hexagonal": 10, "octagonal": 8, "pyramid": 12, "box": 24, "wedge": 14}
+#: Buildings of each kind; the towers are what reflects.
+TOWERS = {"stepped": 10, "hexagonal": 10, "octagonal": 8, "pyramid": 12, "box": 24, "wedge": 14}
 HOUSES = 30
 
+#: Towards the sun.
 SUN = np.array([0.42, 0.52, 0.75])
+#: How far ahead the sky meets the ground, and half the width of both. Larger would cost single precision its
+#: millimetres.
 HORIZON, HALF_WIDTH = 1500.0, 6000.0
 
 
@@ -102,8 +105,10 @@ def build():
 
 
 def textured(face, material):
-    """A face with its texture; flat roofs have no windows, they show the texture's corner only."""
+    """A face with its texture: the ground's has a plot in its middle, flat roofs show no windows but its corner."""
     surface = polygon(face, TILES.get(material, 1.0))
+    if material == "ground":
+        surface.uvs -= CORNER / PITCH - 0.5
     if material in (*GLASS, *PLASTER) and surface.normals[0, 1] > 0.99:
         surface.uvs = np.zeros_like(surface.uvs)
     return surface
@@ -201,10 +206,7 @@ def clouds(size):
 def ground():
     """A plain that reaches to where the sky begins."""
     w, far, near = HALF_WIDTH, -HORIZON, HORIZON
-    # The texture is one plot; the corner falls where a street crossing is.
-    dx, dz = (CORNER - PITCH / 2) % PITCH
-    corners = [(-w + dx, 0, near + dz), (w + dx, 0, near + dz), (w + dx, 0, far + dz), (-w + dx, 0, far + dz)]
-    return Solid("Ground", [corners], "ground")
+    return Solid("Ground", [[(-w, 0, near), (w, 0, near), (w, 0, far), (-w, 0, far)]], "ground")
 
 
 def sky():
@@ -243,19 +245,23 @@ def pyramid(x, z, half, height):
 
 def wedge(x, z, half, height):
     """A box whose roof slopes."""
-    tops = {-1: 0.7 * height, 1: height}
-    lift = lambda corner: corner if corner[1] == 0 else (corner[0], tops[np.sign(corner[0] - x)], corner[2])  # noqa: E731
-    return [[lift(corner) for corner in face] for face in square(x, z, half, 0, height)]
+    faces = square(x, z, half, 0, height)
+    return [[(a, b if b == 0 or a > x else 0.7 * height, c) for a, b, c in face] for face in faces]
 
 
-TOWERS = {
-    "stepped": stepped,
-    "hexagonal": lambda x, z, half, height: prism(x, z, 1.1 * half, 0, height, 6, 0),
-    "octagonal": lambda x, z, half, height: prism(x, z, 1.05 * half, 0, height, 8, 22.5),
-    "pyramid": pyramid,
-    "box": lambda x, z, half, height: square(x, z, half, 0, height),
-    "wedge": wedge,
-}
+def tower(shape, x, z, half, height):
+    """The faces of a tower; their number depends on its shape."""
+    if shape == "stepped":
+        return stepped(x, z, half, height)
+    if shape == "hexagonal":
+        return prism(x, z, 1.1 * half, 0, height, 6, 0)
+    if shape == "octagonal":
+        return prism(x, z, 1.05 * half, 0, height, 8, 22.5)
+    if shape == "pyramid":
+        return pyramid(x, z, half, height)
+    if shape == "wedge":
+        return wedge(x, z, half, height)
+    return square(x, z, half, 0, height)
 
 
 def plots():
@@ -271,7 +277,7 @@ def plots():
 def buildings():
     """Houses under the camera's way, towers elsewhere, higher towards the back."""
     random = random_stream(3)
-    shapes = [shape for shape, count in TOWER_COUNTS.items() for _ in range(count)]
+    shapes = [shape for shape, count in TOWERS.items() for _ in range(count)]
     random.shuffle(shapes)
     places = plots()
     # The plots nearest of all stay empty.
@@ -284,7 +290,7 @@ def buildings():
     for n, ((x, z), shape) in enumerate(zip(places[HOUSES:], shapes, strict=True)):
         back = (60 - z) / 175
         height = 11 + 26 * back + 16 * random.random_sample() ** 2
-        faces = TOWERS[shape](x, z, 4.4 + 1.2 * random.random_sample(), height)
+        faces = tower(shape, x, z, 4.4 + 1.2 * random.random_sample(), height)
         solids.append(Solid(f"Tower {n} {shape}", faces, list(GLASS)[random.randint(len(GLASS))]))
     return solids
 

@@ -123,11 +123,20 @@ impl<'a> Channel<'a> {
         if self.half {
             row.halves.resize(floats.len(), half::f16::ZERO);
             row.halves.convert_from_f32_slice(floats);
-            bytes.extend(row.halves.iter().flat_map(|v| v.to_le_bytes()));
+            append(bytes, &row.halves, |v| v.to_le_bytes());
         } else {
-            bytes.extend(floats.iter().flat_map(|v| v.to_le_bytes()));
+            append(bytes, floats, |v| v.to_le_bytes());
         }
         broken
+    }
+}
+
+/// Appends values of `N` bytes. (`extend` over a flat iterator would go byte by byte, at a fifth of the speed.)
+fn append<T: Copy, const N: usize>(bytes: &mut Vec<u8>, values: &[T], to_bytes: impl Fn(T) -> [u8; N]) {
+    let start = bytes.len();
+    bytes.resize(start + values.len() * N, 0);
+    for (target, &value) in bytes[start..].chunks_exact_mut(N).zip(values) {
+        target.copy_from_slice(&to_bytes(value));
     }
 }
 

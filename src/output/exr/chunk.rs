@@ -86,11 +86,16 @@ pub(super) struct Scratch {
 }
 
 /// The format's ZIP: even bytes before odd ones, each as its difference from the one before, then zlib.
+///
+/// There is an even number of bytes: samples have two or four.
 fn zip<'a>(raw: &[u8], scratch: &'a mut Scratch) -> Result<&'a [u8]> {
     let Scratch { split, differences, packed } = scratch;
-    split.clear();
-    split.extend(raw.iter().step_by(2));
-    split.extend(raw.iter().skip(1).step_by(2));
+    split.resize(raw.len(), 0);
+    let (even, odd) = split.split_at_mut(raw.len() / 2);
+    for ((even, odd), pair) in even.iter_mut().zip(odd).zip(raw.chunks_exact(2)) {
+        *even = pair[0];
+        *odd = pair[1];
+    }
     differences.clear();
     differences.extend(split.first());
     differences.extend(split.windows(2).map(|pair| pair[1].wrapping_sub(pair[0]).wrapping_add(128)));

@@ -207,3 +207,65 @@ fn time_code(number: i64, fps: Rational) -> Option<TimeCode> {
         ..TimeCode::default()
     })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::Lens;
+    use glam::DVec2;
+
+    fn view(projection: Projection, far: f64) -> View {
+        let forward = DVec3::new(0.2, -0.1, -1.0).normalize();
+        let right = forward.cross(DVec3::Y).normalize();
+        View {
+            eye: DVec3::new(1.0, 2.0, 3.0),
+            right,
+            up: right.cross(forward),
+            forward,
+            lens: Lens { projection, shift: DVec2::new(0.1, -0.2), near: 0.5, far },
+            width: 640,
+            height: 480,
+            pixel_aspect: 1.0,
+        }
+    }
+
+    #[test]
+    fn ndc_is_the_place_in_the_image_and_depth_between_the_planes() {
+        for projection in
+            [Projection::Perspective { yfov: 0.8 }, Projection::Orthographic { xmag: 2.0, ymag: 1.5 }]
+        {
+            for far in [f64::INFINITY, 20.0] {
+                let view = view(projection, far);
+                let project = |t: f64, x: f64, y: f64| {
+                    let ray = view.ray(x, y);
+                    ndc_from_world(&view).project_point3(ray.origin + ray.direction * t)
+                };
+                for (x, y) in [(0.0, 0.0), (640.0, 480.0), (320.0, 240.0), (13.5, 400.5)] {
+                    let ndc = project(7.0, x, y);
+                    assert!((ndc.x - x / 640.0).abs() < 1e-9 && (ndc.y - y / 480.0).abs() < 1e-9, "{ndc}");
+                }
+                assert!(project(0.5, 1.0, 1.0).z.abs() < 1e-9, "near plane");
+                assert!(project(8.0, 1.0, 1.0).z > project(7.0, 1.0, 1.0).z, "{projection:?}");
+                if far.is_finite() {
+                    assert!((project(20.0, 1.0, 1.0).z - 1.0).abs() < 1e-9, "far plane");
+                }
+                assert!(ndc_from_world(&view).determinant().abs() > 1e-6, "tools invert it");
+            }
+        }
+    }
+
+    #[test]
+    fn time_codes_count_frames_of_the_nominal_rate() {
+        let code = |number, numerator, denominator| {
+            let c = time_code(number, Rational { numerator, denominator })?;
+            Some((c.hours, c.minutes, c.seconds, c.frame, c.field_phase))
+        };
+        assert_eq!(code(0, 24, 1), Some((0, 0, 0, 0, false)));
+        assert_eq!(code(24 * 3661 + 5, 24, 1), Some((1, 1, 1, 5, false)));
+        assert_eq!(code(24, 24_000, 1001), Some((0, 0, 1, 0, false)));
+        assert_eq!(code(59, 60, 1), Some((0, 0, 0, 29, true)));
+        assert_eq!(code(-1, 25, 1), Some((23, 59, 59, 24, false)));
+        assert_eq!(code(7, 120, 1), None);
+        assert_eq!(code(7, 1, 10), None);
+    }
+}
