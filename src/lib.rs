@@ -2,6 +2,7 @@
 
 pub mod error;
 pub mod frame;
+pub mod import;
 pub mod scene;
 pub mod sequence;
 
