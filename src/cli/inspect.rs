@@ -125,6 +125,7 @@ fn target(scene: &Scene, target: Target) -> (&'static str, &str) {
         Target::CameraYmag(c) => ("ymag", camera(c)),
         Target::CameraNear(c) => ("znear", camera(c)),
         Target::CameraFar(c) => ("zfar", camera(c)),
+        Target::CameraShift(c) => ("shift", camera(c)),
         Target::LightColor(l) => ("color", light(l)),
         Target::LightIntensity(l) => ("intensity", light(l)),
         Target::LightRange(l) => ("range", light(l)),

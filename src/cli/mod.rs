@@ -1,7 +1,6 @@
 //! The command line: arguments as typed, the job as meant, progress, messages. Only here is anything printed.
 
 mod args;
-mod compare;
 mod convert;
 mod inspect;
 mod interrupt;
@@ -39,7 +38,7 @@ fn dispatch(cli: Cli) -> Result<ExitCode> {
     match (cli.command, cli.convert) {
         (Some(Command::Plan(args)), _) => plan::run(args),
         (Some(Command::Inspect(args)), _) => inspect::run(args),
-        (Some(Command::Compare(args)), _) => compare::run(args),
+        (Some(Command::Compare(_)), _) => todo!(),
         (None, Some(args)) => convert::run(args),
         (None, None) => {
             let error =

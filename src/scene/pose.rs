@@ -1,7 +1,7 @@
 //! The scene at one time: where every node, light and lens is.
 
 use super::{Camera, Curve, Lens, LightKind, PosedLight, Scene, Target, View};
-use glam::{DAffine3, DMat3, DQuat, DVec3, Vec3};
+use glam::{DAffine3, DMat3, DQuat, DVec2, DVec3, Vec3};
 
 /// A node's transform under its parent.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -93,6 +93,7 @@ impl Scene {
                 Target::CameraYmag(c) => lenses[c].set_ymag(v[0]),
                 Target::CameraNear(c) => lenses[c].near = v[0],
                 Target::CameraFar(c) => lenses[c].far = v[0],
+                Target::CameraShift(c) => lenses[c].shift = DVec2::from_slice(v),
                 Target::LightColor(l) => lights[l].color = Vec3::new(v[0] as f32, v[1] as f32, v[2] as f32),
                 Target::LightIntensity(l) => lights[l].intensity = v[0] as f32,
                 Target::LightRange(l) => lights[l].range = Some(v[0] as f32),
