@@ -18,7 +18,7 @@ pub struct Cli {
     #[command(subcommand)]
     pub command: Option<Command>,
     #[command(flatten)]
-    pub convert: Option<ConvertArgs>,
+    pub convert: ConvertArgs,
 }
 
 #[derive(Debug, Subcommand)]
@@ -31,12 +31,15 @@ pub enum Command {
     Compare(CompareArgs),
 }
 
+/// Optional for the parser's sake only: a subcommand takes their place.
 #[derive(Debug, Args)]
 pub struct ConvertArgs {
     /// The scene: .gltf, .glb, or .obj (with --camera-from or --turntable).
-    pub input: PathBuf,
+    #[arg(required = true)]
+    pub input: Option<PathBuf>,
     /// Folder for the EXR sequence and report.json.
-    pub out_dir: PathBuf,
+    #[arg(required = true)]
+    pub out_dir: Option<PathBuf>,
     #[command(flatten)]
     pub scene: SceneArgs,
     #[command(flatten)]

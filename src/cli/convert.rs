@@ -17,24 +17,27 @@ use buzz::plan::Plan;
 use buzz::scene::Requirements;
 use buzz::sequence::{FrameSink, Observer, render_sequence};
 use std::collections::BTreeSet;
-use std::path::PathBuf;
+use std::path::Path;
 use std::process::ExitCode;
 use std::time::Instant;
 
 pub fn run(args: ConvertArgs) -> Result<ExitCode> {
     let start = Instant::now();
+    let (Some(input), Some(out_dir)) = (&args.input, &args.out_dir) else {
+        return Err(Error::Usage("INPUT and OUT_DIR are missing".into()).into());
+    };
     let signal = interrupt::watch()?;
     let names =
-        NamePattern::parse(args.output.name.as_deref().unwrap_or(NamePattern::DEFAULT), &stem(&args.input))?;
+        NamePattern::parse(args.output.name.as_deref().unwrap_or(NamePattern::DEFAULT), &stem(input))?;
     let asked = args.output.frames.as_deref().map(parse::frames).transpose()?;
-    let mut job = Job::new(&args.input, &args.scene, &args.image)?;
+    let mut job = Job::new(input, &args.scene, &args.image)?;
     warn_of_ignored(&job.scene);
     choose_image(&mut job, &args)?;
     let timing = job.scene.timing;
     let frames = asked.unwrap_or_else(|| (timing.first..=timing.last).collect());
 
     let hash = settings_hash(&job, &args);
-    let folder = OutputFolder::open(&args.out_dir, names, frames.iter().copied())?;
+    let folder = OutputFolder::open(out_dir, names, frames.iter().copied())?;
     let skipped = existing(&folder, &frames, &hash, &args)?;
     let to_render: BTreeSet<i64> =
         frames.difference(&skipped.iter().map(|r| r.number).collect()).copied().collect();
@@ -78,9 +81,9 @@ pub fn run(args: ConvertArgs) -> Result<ExitCode> {
         plan: plan_seconds,
         wall: start.elapsed().as_secs_f64(),
     };
-    let report = report(&args, &job, &plan, records, seconds);
+    let report = report(input, &job, &plan, records, seconds);
     let whole = frames == (timing.first..=timing.last).collect();
-    let path = args.output.report.clone().unwrap_or_else(|| default_report(&args, &frames, whole));
+    let path = args.output.report.clone().unwrap_or_else(|| out_dir.join(report_name(&frames, whole)));
     report.write_json(&path)?;
     summarise(&report);
     Ok(ExitCode::SUCCESS)
@@ -153,12 +156,11 @@ fn compression(compression: CompressionArg) -> Compression {
 }
 
 /// `report.json`, or one of its own for a part of the range, so that several runs may share a folder.
-fn default_report(args: &ConvertArgs, frames: &BTreeSet<i64>, whole: bool) -> PathBuf {
-    let name = match (frames.first(), frames.last()) {
+fn report_name(frames: &BTreeSet<i64>, whole: bool) -> String {
+    match (frames.first(), frames.last()) {
         (Some(first), Some(last)) if !whole => format!("report.{first}-{last}.json"),
         _ => "report.json".into(),
-    };
-    args.out_dir.join(name)
+    }
 }
 
 /// Keeps what each frame took, and passes it on to be shown.
@@ -180,19 +182,13 @@ impl Observer for Recorder {
     }
 }
 
-fn report(
-    args: &ConvertArgs,
-    job: &Job,
-    plan: &Plan,
-    frames: Vec<FrameRecord>,
-    seconds: RunSeconds,
-) -> Report {
+fn report(input: &Path, job: &Job, plan: &Plan, frames: Vec<FrameRecord>, seconds: RunSeconds) -> Report {
     let scene = &job.scene;
     let keyframes =
         plan.keyframes.iter().map(|k| KeyFrame { frame: k.frame, reason: k.reason.name().into() });
     let segments = plan.segments.iter().map(|s| SegmentRange { key: s.key, first: s.first, last: s.last });
     Report::new(ReportInput {
-        input: args.input.display().to_string(),
+        input: input.display().to_string(),
         settings: output::Settings {
             quality: job.quality.name().into(),
             width: job.settings.width,

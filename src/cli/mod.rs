@@ -11,7 +11,7 @@ mod progress;
 
 use anyhow::Result;
 use args::{Cli, Command};
-use clap::{CommandFactory, Parser, error::ErrorKind};
+use clap::Parser;
 use std::process::ExitCode;
 
 /// Runs the program and returns its exit code.
@@ -35,15 +35,10 @@ pub fn run() -> ExitCode {
 }
 
 fn dispatch(cli: Cli) -> Result<ExitCode> {
-    match (cli.command, cli.convert) {
-        (Some(Command::Plan(args)), _) => plan::run(args),
-        (Some(Command::Inspect(args)), _) => inspect::run(args),
-        (Some(Command::Compare(_)), _) => todo!(),
-        (None, Some(args)) => convert::run(args),
-        (None, None) => {
-            let error =
-                Cli::command().error(ErrorKind::MissingRequiredArgument, "INPUT and OUT_DIR are missing");
-            error.exit()
-        }
+    match cli.command {
+        Some(Command::Plan(args)) => plan::run(args),
+        Some(Command::Inspect(args)) => inspect::run(args),
+        Some(Command::Compare(_)) => todo!(),
+        None => convert::run(cli.convert),
     }
 }
