@@ -145,28 +145,30 @@ def _primvars(mesh: UsdGeom.Mesh, time: Usd.TimeCode, out: Polygons, lost: Lost)
             values = _at_corners(primvar, time, out, 1, str(mesh.GetPath()), lost)
             if values is not None:
                 out.corner["opacity"] = values
+    # `primvars:normals` wins over the attribute `normals` (UsdGeomPointBased).
     normals = api.GetPrimvar("normals")
-    if not normals or not normals.HasValue():
-        attribute = mesh.GetNormalsAttr()
-        normals = UsdGeom.Primvar(attribute) if attribute.HasAuthoredValue() else None
-    if normals:
-        if not normals.HasAuthoredInterpolation() and normals.GetPrimvarName() != "normals":
-            interpolation = mesh.GetNormalsInterpolation()
-        else:
-            interpolation = normals.GetInterpolation() if normals.HasAuthoredInterpolation() else mesh.GetNormalsInterpolation()
-        values = _at_corners(normals, time, out, 3, str(mesh.GetPath()), lost, interpolation)
-        if values is not None:
-            length = np.linalg.norm(values, axis=1, keepdims=True)
-            out.corner["NORMAL"] = np.where(length > 1e-12, values / np.maximum(length, 1e-30), (0, 1, 0))
+    values = None
+    if normals and normals.HasValue():
+        values = _at_corners(normals, time, out, 3, str(mesh.GetPath()), lost)
+    elif mesh.GetNormalsAttr().HasAuthoredValue():
+        data = np.array(mesh.GetNormalsAttr().Get(time) or [], dtype=float).reshape(-1, 3)
+        values = _spread(data, mesh.GetNormalsInterpolation(), out, str(mesh.GetPath()), "normals", lost)
+    if values is not None:
+        length = np.linalg.norm(values, axis=1, keepdims=True)
+        out.corner["NORMAL"] = np.where(length > 1e-12, values / np.maximum(length, 1e-30), (0, 1, 0))
 
 
-def _at_corners(primvar, time, out: Polygons, width: int, path: str, lost: Lost, interpolation: str | None = None) -> np.ndarray | None:
+def _at_corners(primvar: UsdGeom.Primvar, time: Usd.TimeCode, out: Polygons, width: int, path: str, lost: Lost) -> np.ndarray | None:
     """A primvar's values at every corner, indices resolved; None if it has none or they do not fit."""
     data = primvar.ComputeFlattened(time) if primvar.IsIndexed() else primvar.Get(time)
     if data is None:
         return None
     values = np.array(data, dtype=float).reshape(-1, width)
-    interpolation = interpolation or primvar.GetInterpolation()
+    return _spread(values, primvar.GetInterpolation(), out, path, f"primvar {primvar.GetPrimvarName()}", lost)
+
+
+def _spread(values: np.ndarray, interpolation: str, out: Polygons, path: str, name: str, lost: Lost) -> np.ndarray | None:
+    """Values of an interpolation at every corner."""
     face_of = np.repeat(np.arange(len(out.counts)), out.counts)
     index = {
         UsdGeom.Tokens.constant: np.zeros(len(out.corners), dtype=int),
@@ -176,7 +178,7 @@ def _at_corners(primvar, time, out: Polygons, width: int, path: str, lost: Lost,
         UsdGeom.Tokens.faceVarying: np.arange(len(out.corners)),
     }.get(interpolation)
     if index is None or (len(index) and index.max() >= len(values)):
-        lost.add(path, f"primvar {primvar.GetPrimvarName()} (its size does not fit {interpolation})", "it is left out; check it with usdchecker")
+        lost.add(path, f"{name} (its size does not fit {interpolation})", "it is left out; check it with usdchecker")
         return None
     return values[index]
 
