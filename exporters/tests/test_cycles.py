@@ -130,7 +130,7 @@ def test_pictures_line_up(blender, export, buzz, tmp_path, case):
     elif case == "ortho":
         camera.data.type, camera.data.ortho_scale = "ORTHO", 11.0
     elif case == "pixel aspect":
-        scene.render.pixel_aspect_x = 2.0
+        scene.render.pixel_aspect_y = 1.5
     else:
         scene.render.fps, scene.render.fps_base = 24, 1.001
         scene.frame_start, scene.frame_end, frame = 101, 104, 103
