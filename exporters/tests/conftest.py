@@ -40,9 +40,8 @@ def blender():
 @pytest.fixture
 def export(blender, tmp_path):
     """Export the open scene and read it back, validated: export(name=..., **options)."""
-    from gltf_reader import Gltf
-
     from exporters.blender import job
+    from gltf_reader import Gltf
 
     def run(name: str = "anim.gltf", **options) -> Gltf:
         result = job.export(tmp_path / name, job.Options(**options))
@@ -56,9 +55,8 @@ def export(blender, tmp_path):
 def usd_convert(tmp_path):
     """Convert a stage and read it back, validated: usd_convert(stage or path, name=..., **options)."""
     pytest.importorskip("pxr", reason="SKIPPED LOUDLY: usd-core is not installed (pip install usd-core)")
-    from gltf_reader import Gltf
-
     from exporters.usd import job
+    from gltf_reader import Gltf
 
     def run(stage, name: str = "anim.gltf", **options) -> Gltf:
         if not isinstance(stage, (str, Path)):

@@ -36,17 +36,20 @@ def cycles_settings(bpy) -> None:
     layer.use_pass_z = layer.use_pass_object_index = True
 
 
-def cycles_render(bpy, path: Path, frame: int | None = None) -> dict[str, np.ndarray]:
-    """Render the current frame; Combined as R, G, B, depth and object index as `Z` and `index`."""
+def cycles_render(bpy, path: Path, frame: int | None = None, layers: bool = True) -> dict[str, np.ndarray]:
+    """Render the current frame; Combined as R, G, B, A, with layers also depth and object index as `Z` and `index`."""
     scene = bpy.context.scene
     if frame is not None:
         scene.frame_set(frame)
     settings = scene.render.image_settings
     if hasattr(settings, "media_type"):
-        settings.media_type = "MULTI_LAYER_IMAGE"
-    settings.file_format, settings.color_depth = "OPEN_EXR_MULTILAYER", "32"
+        settings.media_type = "MULTI_LAYER_IMAGE" if layers else "IMAGE"
+    settings.file_format, settings.color_depth = "OPEN_EXR_MULTILAYER" if layers else "OPEN_EXR", "32"
+    settings.color_mode = "RGBA"
     scene.render.filepath = str(path)
     bpy.ops.render.render(write_still=True)
+    if not layers:
+        return read_exr(path)
     out = {}
     for name, values in read_exr(path).items():
         tail = name.split(".", 1)[-1]

@@ -168,12 +168,12 @@ def test_collection_instances(blender, export):
     assert sorted(round(-gltf.world(n, 3)[2, 3], 4) for n in nodes) == [0, 3, 9]
 
 
-def test_geometry_nodes_instances(blender, export):
+def scatter(blender, name: str, size: float):
+    """A plane with a small ball on each corner, by geometry nodes."""
     import blender_scene as b
 
-    b.camera()
-    ob = b.plane("Scatter", size=4)
-    tree = blender.data.node_groups.new("Scatter", "GeometryNodeTree")
+    ob = b.plane(name, size=size)
+    tree = blender.data.node_groups.new(name, "GeometryNodeTree")
     tree.interface.new_socket("Geometry", in_out="INPUT", socket_type="NodeSocketGeometry")
     tree.interface.new_socket("Geometry", in_out="OUTPUT", socket_type="NodeSocketGeometry")
     start, end = tree.nodes.new("NodeGroupInput"), tree.nodes.new("NodeGroupOutput")
@@ -182,6 +182,13 @@ def test_geometry_nodes_instances(blender, export):
     tree.links.new(ball.outputs["Mesh"], points.inputs["Instance"])
     tree.links.new(points.outputs[0], end.inputs[0])
     ob.modifiers.new("g", "NODES").node_group = tree
+
+
+def test_geometry_nodes_instances(blender, export):
+    import blender_scene as b
+
+    b.camera()
+    scatter(blender, "Scatter", 4)
     gltf = export()
     nodes = [i for i, n in enumerate(gltf.root["nodes"]) if n["name"] == "Scatter"]
     places = sorted(tuple(np.round(gltf.world(n, 1)[[0, 2], 3], 4)) for n in nodes)

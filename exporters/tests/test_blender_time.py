@@ -6,7 +6,6 @@ import json
 
 import numpy as np
 import pytest
-
 from exporters.common.extras import rational, simplify_cuts
 
 

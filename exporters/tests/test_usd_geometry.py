@@ -11,10 +11,9 @@ import pytest
 
 pytest.importorskip("pxr", reason="SKIPPED LOUDLY: usd-core is not installed (pip install usd-core)")
 import usd_scene as u
+from exporters.usd.subdivide import Polygons, catmull_clark
 from PIL import Image
 from pxr import Gf, Sdf, Usd, UsdGeom, UsdSkel, UsdUtils, Vt
-
-from exporters.usd.subdivide import Polygons, catmull_clark
 
 
 def primitive(gltf, name, number=0):
@@ -329,7 +328,12 @@ def test_preview_surface(usd_convert):
     u.camera(made)
     prim = u.quad(made, "/World/Card")
     prim.CreateDoubleSidedAttr(True)
-    u.bind(prim, u.preview(made, "/World/M", diffuseColor=(0.1, 0.2, 0.3), metallic=0.5, roughness=0.25, ior=1.8, clearcoat=1.0, emissiveColor=(4.0, 2.0, 0.0), opacity=0.5))
+    u.bind(
+        prim,
+        u.preview(
+            made, "/World/M", diffuseColor=(0.1, 0.2, 0.3), metallic=0.5, roughness=0.25, ior=1.8, clearcoat=1.0, emissiveColor=(4.0, 2.0, 0.0), opacity=0.5
+        ),
+    )
     material = usd_convert(made).root["materials"][0]
     pbr = material["pbrMetallicRoughness"]
     assert pbr["baseColorFactor"] == pytest.approx([0.1, 0.2, 0.3, 0.5])

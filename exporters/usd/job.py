@@ -87,7 +87,10 @@ def open_stage(source: Path, variants: list[tuple[str, str, str]], lost: Lost) -
         if not path:
             owners = owners or [p for p in stage.Traverse() if name in p.GetVariantSets().GetNames()]
         if not owners:
-            raise InputError(f"variant set {name!r}: no prim {path or 'of the stage'} has it")
+            have = sorted({f"{p.GetPath()}:{n}" for p in stage.Traverse() for n in p.GetVariantSets().GetNames()})
+            raise InputError(
+                f"variant set {name!r}: {path or 'no prim of the stage'} {'has it not' if path else 'has it'}; there are {', '.join(have) or 'none'}"
+            )
         for owner in owners:
             have = owner.GetVariantSet(name).GetVariantNames()
             if choice not in have:
