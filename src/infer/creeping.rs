@@ -10,6 +10,7 @@
 
 use super::Marks;
 use super::buzz_buffer::{BuzzBuffer, UNKNOWN};
+use super::obscured::DEPTH_STEP;
 use super::project::Landings;
 use crate::frame::PixelClass;
 use rayon::prelude::*;
@@ -38,14 +39,12 @@ pub fn creeping(buffer: &BuzzBuffer, landings: &Landings, along: Along, marks: &
     (0..lines).into_par_iter().with_min_len(16).for_each(|line| {
         let pixel = |at: usize| if along == Along::Columns { at * width + line } else { line * width + at };
         for begin in 0..length.saturating_sub(2) {
-            let object = buffer.object[pixel(begin)];
-            if object == 0 || buffer.object[pixel(begin + 1)] == object {
+            let continues = |at: usize| is_same_surface(buffer, pixel(begin), pixel(at));
+            if buffer.object[pixel(begin)] == 0 || continues(begin + 1) {
                 continue;
             }
             let furthest = (begin + 1 + LONGEST_GAP).min(length - 1);
-            let Some(end) = (begin + 2..=furthest).find(|&at| buffer.object[pixel(at)] == object) else {
-                continue;
-            };
+            let Some(end) = (begin + 2..=furthest).find(|&at| continues(at)) else { continue };
             if !were_neighbours(landings, pixel(begin), pixel(end), width) {
                 continue;
             }
@@ -70,6 +69,12 @@ pub fn forget_creeping(buffer: &mut BuzzBuffer, marks: &Marks) {
             }
         }
     });
+}
+
+/// True where the two pixels show one object without a step in depth.
+fn is_same_surface(buffer: &BuzzBuffer, a: usize, b: usize) -> bool {
+    let (near, far) = (buffer.z[a].min(buffer.z[b]), buffer.z[a].max(buffer.z[b]));
+    buffer.object[a] == buffer.object[b] && far <= near * DEPTH_STEP
 }
 
 /// True where both pixels hold samples that came from neighbouring pixels of the old image.

@@ -18,7 +18,7 @@ use rayon::prelude::*;
 
 /// Relative step in depth from which two neighbours count as apart. 3 % is what a prototype used; walking from every
 /// sample changed no count that it saw.
-const DEPTH_STEP: f32 = 1.03;
+pub(super) const DEPTH_STEP: f32 = 1.03;
 
 /// Walks L behind every old hit at a discontinuity and marks the pixels whose sample it may hide.
 pub fn obscured(
