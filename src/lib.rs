@@ -2,6 +2,7 @@
 
 pub mod error;
 pub mod frame;
+pub mod measure;
 pub mod output;
 pub mod scene;
 pub mod sequence;

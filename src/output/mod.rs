@@ -28,3 +28,4 @@ pub use report::{
 };
 pub use resume::FrameFile;
 pub use sink::ExrSink;
+pub(crate) use write::write_whole;
