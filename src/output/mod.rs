@@ -9,6 +9,7 @@ mod hash;
 mod lock;
 mod memory;
 mod naming;
+mod page;
 mod peak;
 mod report;
 mod resume;
