@@ -1,5 +1,7 @@
 //! Encoding and writing of frames: `cargo bench --bench write`.
 
+#![allow(missing_docs, clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::print_stdout)]
+
 #[path = "../tests/support/mod.rs"]
 mod support;
 

@@ -5,6 +5,7 @@ pub mod error;
 pub mod frame;
 pub mod import;
 pub mod infer;
+pub mod measure;
 pub mod output;
 pub mod plan;
 pub mod scene;

@@ -1,5 +1,7 @@
 //! The files that frames become: read back by the `exr` crate, and by Python's OpenEXR and OpenImageIO.
 
+#![allow(missing_docs, clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::print_stdout)]
+
 mod support;
 
 use buzz::frame::{Frame, FrameKind, Window};
@@ -95,7 +97,7 @@ fn the_exr_crate_reads_back_what_was_written() {
         let expected = expected_channels(&frame);
         assert_eq!(layer.channel_data.list.len(), expected.len(), "{name}");
         for (channel, half, values) in expected {
-            let read = layer.channel_data.list.iter().find(|c| c.name.eq(&*channel)).unwrap();
+            let read = layer.channel_data.list.iter().find(|c| c.name.eq(&channel)).unwrap();
             match &read.sample_data {
                 FlatSamples::F16(read) => {
                     assert!(half, "{name} {channel}");

@@ -9,6 +9,7 @@ mod hash;
 mod lock;
 mod memory;
 mod naming;
+mod page;
 mod peak;
 mod report;
 mod resume;
@@ -28,3 +29,4 @@ pub use report::{
 };
 pub use resume::FrameFile;
 pub use sink::ExrSink;
+pub(crate) use write::write_whole;

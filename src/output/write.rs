@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 ///
 /// # Errors
 /// [`Error::Output`]; then nothing is left behind, and what was at `path` before is still there.
-pub(super) fn write_whole<'a>(path: &Path, parts: impl IntoIterator<Item = &'a [u8]>) -> Result<()> {
+pub(crate) fn write_whole<'a>(path: &Path, parts: impl IntoIterator<Item = &'a [u8]>) -> Result<()> {
     let temporary = temporary_name(path);
     write_and_rename(&temporary, path, parts).map_err(|error| {
         // It may not exist; the error that matters is the first one.
