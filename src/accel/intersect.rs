@@ -1,7 +1,7 @@
 //! Rays through both levels of trees.
 
 use super::opacity::{self, CULL_BACK, EYE_PASS, EYE_TEST, SHADOW_PASS, SHADOW_TEST};
-use super::tree::Tree;
+use super::tree::{Bounds, Tree};
 use super::triangle::{ShearedRay, TreeTriangle, TriangleHit};
 use super::{Accel, Placed};
 use crate::frame::SurfaceRef;
@@ -50,13 +50,12 @@ impl Accel {
         t_max: f32,
         sides: Sides,
     ) -> Option<RayHit> {
-        let per_unit = 1.0 / self.unit;
-        let ray = tree_ray(origin, direction * self.unit, t_min * per_unit, t_max * per_unit);
-        let hit = TriangleHit { t: ray.tmax, u: 0.0, v: 0.0, front: true };
+        let hit = TriangleHit { t: t_max / self.unit, u: 0.0, v: 0.0, front: true };
         let mut nearest = Nearest { hit, instance: SurfaceRef::NONE, primitive: 0 };
+        let (ray, start) = self.upper_ray(origin, direction, t_min, t_max);
         self.upper.ray_traverse(ray, &mut TreeHit::none(), |ray, slot| {
-            self.nearest_in(scene, &self.placed[slot], ray, sides, &mut nearest);
-            nearest.hit.t
+            self.nearest_in(scene, &self.placed[slot], ray, start, sides, &mut nearest);
+            nearest.hit.t - start
         });
         (nearest.instance != SurfaceRef::NONE).then_some(RayHit {
             t: nearest.hit.t * self.unit,
@@ -73,39 +72,59 @@ impl Accel {
     /// True if light passes from `from` along `direction` as far as `t_max` lengths of it: nothing there has an
     /// opacity, alpha x (1 - transmission), of one half or more. Both sides of every surface block it.
     pub fn unoccluded(&self, scene: &Scene, from: Vec3, direction: Vec3, t_max: f32) -> bool {
-        let ray = tree_ray(from, direction * self.unit, 0.0, t_max / self.unit);
+        let (ray, _) = self.upper_ray(from, direction, 0.0, t_max);
         self.upper.ray_traverse_miss(ray, |ray, slot| {
             let placed = &self.placed[slot];
             let group = &self.groups[placed.group];
             let tree = &self.trees[group.tree];
-            let (local, sheared) = placed.local(ray);
+            let (local, sheared, _) = placed.local(ray, &tree.bounds);
             let missed = tree.bvh.ray_traverse_miss(local, |ray, i| {
                 let triangle = &tree.triangles[i];
                 match sheared.intersect(triangle, ray.tmin, ray.tmax) {
                     Some(hit)
                         if blocks(scene, self.mesh(scene, &group.instances, triangle), triangle, &hit) =>
                     {
-                        0.0
+                        f32::NEG_INFINITY
                     }
                     _ => f32::INFINITY,
                 }
             });
-            if missed { f32::INFINITY } else { 0.0 }
+            if missed { f32::INFINITY } else { f32::NEG_INFINITY }
         })
     }
 
-    fn nearest_in(&self, scene: &Scene, placed: &Placed, ray: &Ray, sides: Sides, nearest: &mut Nearest) {
+    /// The ray for the upper tree, in its unit, and how far along the given one it starts.
+    fn upper_ray(&self, origin: Vec3, direction: Vec3, t_min: f32, t_max: f32) -> (Ray, f32) {
+        let direction = direction * self.unit;
+        let start = self.bounds.approach(origin, direction);
+        let (t_min, t_max) = (t_min / self.unit - start, t_max / self.unit - start);
+        (tree_ray(origin + direction * start, direction, t_min, t_max), start)
+    }
+
+    /// Looks for something nearer in one placed group; `start` is how far along the whole ray `ray` starts.
+    fn nearest_in(
+        &self,
+        scene: &Scene,
+        placed: &Placed,
+        ray: &Ray,
+        start: f32,
+        sides: Sides,
+        nearest: &mut Nearest,
+    ) {
         let group = &self.groups[placed.group];
         let tree: &Tree = &self.trees[group.tree];
-        let (local, sheared) = placed.local(ray);
+        let (local, sheared, on) = placed.local(ray, &tree.bounds);
+        let start = start + on;
         tree.bvh.ray_traverse(local, &mut TreeHit::none(), |ray, i| {
             let triangle = &tree.triangles[i];
-            let Some(hit) = sheared.intersect(triangle, ray.tmin, nearest.hit.t) else {
+            let Some(mut hit) = sheared.intersect(triangle, ray.tmin, nearest.hit.t - start) else {
                 return f32::INFINITY;
             };
+            let t = hit.t;
+            hit.t += start;
             let instance = group.instances[triangle.part() as usize];
             let found = (instance, triangle.primitive());
-            if hit.t == nearest.hit.t && found >= (nearest.instance, nearest.primitive) {
+            if hit.t >= nearest.hit.t && found >= (nearest.instance, nearest.primitive) {
                 return f32::INFINITY;
             }
             let flags = triangle.flags();
@@ -120,7 +139,7 @@ impl Accel {
                 }
             }
             *nearest = Nearest { hit, instance: found.0, primitive: found.1 };
-            hit.t
+            t
         });
     }
 
@@ -138,11 +157,19 @@ fn blocks(scene: &Scene, mesh: &Mesh, triangle: &TreeTriangle, hit: &TriangleHit
 }
 
 impl Placed {
-    /// The ray in the group's own space; its parameter stays the same, since its direction is not normalised.
-    fn local(&self, ray: &Ray) -> (Ray, ShearedRay) {
-        let origin = Vec3::from(self.object_from_render.transform_point3a(ray.origin));
+    /// The ray in the group's own space, and how far along the given one it starts. Its parameter is measured alike,
+    /// since its direction is not normalised.
+    #[inline]
+    fn local(&self, ray: &Ray, bounds: &Bounds) -> (Ray, ShearedRay, f32) {
+        let mut origin = Vec3::from(self.object_from_render.transform_point3a(ray.origin));
         let direction = Vec3::from(self.object_from_render.transform_vector3a(ray.direction));
-        (tree_ray(origin, direction, ray.tmin, ray.tmax), ShearedRay::new(origin, direction))
+        let start = bounds.approach(origin, direction);
+        origin += direction * start;
+        (
+            tree_ray(origin, direction, ray.tmin - start, ray.tmax - start),
+            ShearedRay::new(origin, direction),
+            start,
+        )
     }
 }
 

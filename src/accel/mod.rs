@@ -165,14 +165,14 @@ impl Accel {
             bounds.push(bound);
             placed.push(Placed { group: number, object_from_render: placement.render_from_object.inverse() });
         }
-        self.upper = build_over(&bounds);
-        let mut slots: Vec<Option<Placed>> = placed.into_iter().map(Some).collect();
-        self.placed = self.upper.primitive_indices.iter().filter_map(|&i| slots[i as usize].take()).collect();
         self.bounds = bounds.iter().fold(Bounds::default(), |mut all, b| {
             all.include(b.min);
             all.include(b.max);
             all
         });
+        self.upper = build_over(&bounds, &self.bounds);
+        let mut slots: Vec<Option<Placed>> = placed.into_iter().map(Some).collect();
+        self.placed = self.upper.primitive_indices.iter().filter_map(|&i| slots[i as usize].take()).collect();
         let size = (self.bounds.max - self.bounds.min).max_element();
         // A scene is 2^13 to 2^14 units across; the exponent alone, so a power of two.
         let size = if size > 0.0 { size.clamp(1e-20, 1e20) } else { 1.0 };

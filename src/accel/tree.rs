@@ -15,8 +15,12 @@ use obvhs::ploc::{PlocBuilder, PlocSearchDistance, SortPrecision};
 const MAX_COORDINATE: f32 = 1e15;
 
 /// Boxes are larger than what they hold by this share of the largest coordinate, so that the rounding of the box test
-/// never loses a ray that runs along a box's side.
-const PADDING: f32 = 1.0 / (1 << 20) as f32;
+/// never loses a ray that runs along a box's side. The test's error grows with the distance of the ray's origin; see
+/// [`Bounds::approach`].
+const PADDING: f32 = 1.0 / (1 << 18) as f32;
+
+/// A ray that starts further away than this many sizes of a tree's bounds is brought nearer.
+const FAR: f32 = 4.0;
 
 /// A tree over triangles, which lie in its order.
 #[derive(Default)]
@@ -61,6 +65,21 @@ impl Bounds {
     /// The largest absolute coordinate.
     pub fn reach(&self) -> f32 {
         self.min.abs().max(self.max.abs()).max_element()
+    }
+
+    /// How far along it a ray should start so that the tests against what is in here, whose errors grow with the
+    /// distance of the origin, stay within the boxes' padding: 0 if it is near, otherwise the parameter of a point
+    /// about one size before the bounds. Rounding that point moves the ray as a whole, the same for all tests, and no
+    /// more than rounding has moved it already.
+    pub fn approach(&self, origin: Vec3, direction: Vec3) -> f32 {
+        let size = (self.max - self.min).max_element();
+        let away = (self.min - origin).max(origin - self.max).max_element();
+        if away <= size * FAR {
+            return 0.0;
+        }
+        // As far as the origin is away, less one size, is surely before the bounds, whatever the direction.
+        let start = (away - size) / direction.length();
+        if start.is_finite() { start } else { 0.0 }
     }
 
     fn padded(&self, reach: f32) -> Aabb {
@@ -108,9 +127,9 @@ impl Tree {
     }
 }
 
-/// A tree over boxes, padded by the caller's own reach.
-pub(super) fn build_over(bounds: &[Bounds]) -> CwBvh {
-    let boxes: Vec<Aabb> = bounds.iter().map(|b| b.padded(b.reach())).collect();
+/// A tree over boxes that together span `all`.
+pub(super) fn build_over(bounds: &[Bounds], all: &Bounds) -> CwBvh {
+    let boxes: Vec<Aabb> = bounds.iter().map(|b| b.padded(all.reach())).collect();
     build(&boxes)
 }
 

@@ -57,5 +57,5 @@ pub(super) fn environment_share(f0: Vec3, f90: f32, roughness: f32, cos: f32) ->
     let r = c0 * roughness + c1;
     let a004 = (r.x * r.x).min((-9.28 * cos).exp2()) * r.x + r.y;
     let ab = Vec2::new(-1.04, 1.04) * a004 + r.zw();
-    (f0 * ab.x + Vec3::splat(f90 * ab.y)).max(Vec3::ZERO)
+    f0 * ab.x + Vec3::splat(f90 * ab.y.max(0.0))
 }
