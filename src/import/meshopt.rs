@@ -471,6 +471,46 @@ mod tests {
         }
     }
 
+    // The streams below were made by the reference encoder, meshoptimizer 1.3.
+
+    #[test]
+    fn reference_vertex_streams_of_both_versions_decode() {
+        let wanted: Vec<u8> = (0..20_u16)
+            .flat_map(|i| [i * 7, i * i, 1000 - i * 3, if i.is_multiple_of(5) { 9 } else { 0 }])
+            .flat_map(u16::to_le_bytes)
+            .collect();
+        let version_0 = [
+            160, 10, 14, 238, 238, 238, 238, 238, 238, 238, 238, 238, 0, 0, 0, 0, 0, 0, 0, 7, 0, 2, 6, 10,
+            14, 18, 22, 26, 30, 34, 38, 42, 46, 50, 54, 58, 255, 0, 0, 0, 62, 66, 70, 74, 4, 128, 0, 0, 0,
+            10, 5, 85, 85, 85, 85, 85, 85, 85, 85, 85, 0, 0, 0, 0, 0, 0, 0, 5, 48, 60, 15, 3, 17, 18, 17, 18,
+            17, 18, 192, 0, 0, 0, 17, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+            0, 0, 0, 0, 0, 232, 3, 9, 0,
+        ];
+        let version_1 = [
+            161, 185, 153, 2, 14, 238, 238, 238, 238, 238, 238, 238, 15, 0, 14, 14, 14, 14, 0, 2, 6, 10, 14,
+            18, 22, 26, 30, 34, 38, 42, 46, 50, 54, 58, 62, 66, 70, 74, 2, 5, 85, 85, 85, 85, 85, 85, 85, 15,
+            0, 5, 5, 5, 5, 0, 98, 140, 17, 18, 17, 18, 17, 18, 1, 0, 17, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0,
+            0, 0, 0, 0, 0, 0, 232, 3, 9, 0, 1, 0,
+        ];
+        for stream in [&version_0[..], &version_1] {
+            assert_eq!(decode(stream, 20, 8, Mode::Attributes, Filter::None).as_ref(), Ok(&wanted));
+            for end in 0..stream.len() {
+                assert!(decode(&stream[..end], 20, 8, Mode::Attributes, Filter::None).is_err());
+            }
+        }
+    }
+
+    #[test]
+    fn the_reference_triangle_stream_of_version_1_decodes() {
+        let stream = [
+            225, 240, 16, 254, 255, 47, 240, 12, 255, 2, 2, 2, 22, 0, 118, 135, 86, 103, 120, 169, 134, 101,
+            137, 104, 152, 1, 105, 0, 0,
+        ];
+        let wanted = [0_u32, 1, 2, 2, 1, 3, 4, 6, 5, 7, 8, 9, 8, 7, 20];
+        let wanted: Vec<u8> = wanted.iter().flat_map(|v| v.to_le_bytes()).collect();
+        assert_eq!(decode(&stream, 15, 4, Mode::Triangles, Filter::None), Ok(wanted));
+    }
+
     #[test]
     fn the_reference_triangle_stream_decodes() {
         let stream = [
