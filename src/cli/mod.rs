@@ -1,6 +1,7 @@
 //! The command line: arguments as typed, the job as meant, progress, messages. Only here is anything printed.
 
 mod args;
+mod compare;
 mod convert;
 mod inspect;
 mod interrupt;
@@ -38,7 +39,7 @@ fn dispatch(cli: Cli) -> Result<ExitCode> {
     match cli.command {
         Some(Command::Plan(args)) => plan::run(args),
         Some(Command::Inspect(args)) => inspect::run(args),
-        Some(Command::Compare(_)) => todo!(),
+        Some(Command::Compare(args)) => compare::run(args),
         None => convert::run(cli.convert),
     }
 }
