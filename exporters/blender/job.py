@@ -110,6 +110,8 @@ class _Export:
         surround = world.export_world(self.scene, self.path.parent, self.path.stem, self.lost)
         if surround is not None:
             world.animate_world(animation, sky, surround)
+        if not document.root.get("extensions", {}).get("KHR_lights_punctual") and _dark(surround):
+            self.lost.add(self.scene.name, "no light", "no light is visible in the render and the world is black; show a light, or only emission is seen")
         animation.close()
         self._finish(document, fps, self._cuts(sampler), surround)
         return Result(self.path, self.lost, document.root)
@@ -229,6 +231,11 @@ class _Export:
             document.root["scenes"][0].pop("nodes")
         extras.check(document.root)
         document.save(self.path)
+
+
+def _dark(surround: dict | None) -> bool:
+    """Whether a world sheds no light (an animated one may later)."""
+    return surround is None or "image" not in surround and (surround["strength"] == 0 or not any(surround["color"]))
 
 
 def _choose_scene(name: str | None) -> bpy.types.Scene:

@@ -82,7 +82,7 @@ def test_matrices_in_the_renderer(blender, export, buzz, case):
 def test_animated_lens_shift_and_clip(blender, export):
     import blender_scene as b
 
-    scene, ob = build(blender)
+    _scene, ob = build(blender)
     b.key(ob.data, "lens", {1: 35.0, 5: 80.0})
     b.key(ob.data, "shift_x", {1: 0.0, 5: 0.3})
     b.key(ob.data, "clip_start", {1: 0.1, 5: 0.5})

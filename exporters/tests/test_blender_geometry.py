@@ -228,7 +228,7 @@ def test_volumes_and_wires_are_named(blender, export):
     gltf = export()
     assert gltf.lost_features("Smoke") == ["volume"]
     assert gltf.lost_features("Wire") == ["object without faces"]
-    assert [i for i in gltf.buzz["lost"] if i["object"] == "Smoke"][0]["action"]
+    assert next(i for i in gltf.buzz["lost"] if i["object"] == "Smoke")["action"]
 
 
 def test_procedural_colour_is_baked(blender, export):
@@ -274,7 +274,7 @@ def test_plain_shaders_become_principled(blender, export, shader, check):
 
     b.camera()
     ob = b.cube()
-    made, old = b.material()
+    made, _old = b.material()
     tree = made.node_tree
     new = tree.nodes.new(shader)
     new.inputs["Color"].default_value = (0.1, 0.2, 0.3, 1)

@@ -278,8 +278,8 @@ def test_usd_lights_instances_and_shapes(usd_convert, buzz, tmp_path):
     depth = r.read_exr(r.frames_of(tmp_path / "many")[1])["depth.Z"]
     # Front of the spheres: 10 m - 1 m - 0.5 m; 2.5 m to the side at 8.5 m of depth.
     column = 32.5 + 2.5 / 9 * 65
-    assert depth[32, int(column)] == pytest.approx(8.5, abs=0.02)
-    assert depth[32, int(65 - column)] == pytest.approx(8.5, abs=0.02)
+    assert depth[32, int(column)] == pytest.approx(8.5, abs=0.05)
+    assert depth[32, int(65 - column)] == pytest.approx(8.5, abs=0.05)
     assert depth[32, 32] == pytest.approx(10.0, rel=1e-5)
 
 

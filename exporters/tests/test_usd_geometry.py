@@ -437,3 +437,25 @@ def test_what_is_not_carried_is_named(usd_convert):
     assert gltf.lost_features("/World/Smoke") == ["Volume"]
     assert gltf.lost_features("/World/Empty") == ["mesh without faces"]
     assert "damaged mesh" in gltf.lost_features("/World/Broken")[0]
+
+
+def test_display_colour_read_by_a_material(usd_convert):
+    from pxr import UsdShade
+
+    made = u.stage()
+    u.camera(made)
+    prim = u.quad(made, "/World/Card")
+    prim.CreateDisplayColorPrimvar("vertex").Set([(1, 0, 0), (0, 1, 0), (0, 0, 1), (1, 1, 1)])
+    material = u.preview(made, "/World/M", roughness=0.25)
+    reader = UsdShade.Shader.Define(made, "/World/M/Reader")
+    reader.CreateIdAttr("UsdPrimvarReader_float3")
+    reader.CreateInput("varname", Sdf.ValueTypeNames.String).Set("displayColor")
+    surface = UsdShade.Shader(made.GetPrimAtPath("/World/M/Surface"))
+    surface.CreateInput("diffuseColor", Sdf.ValueTypeNames.Color3f).ConnectToSource(reader.ConnectableAPI(), "result")
+    u.bind(prim, material)
+    plain = u.quad(made, "/World/Plain")
+    plain.CreateDisplayColorPrimvar("vertex").Set([(1, 0, 0), (0, 1, 0), (0, 0, 1), (1, 1, 1)])
+    u.bind(plain, u.preview(made, "/World/N"))
+    gltf = usd_convert(made)
+    assert len(np.unique(primitive(gltf, "Card")[1]["COLOR_0"], axis=0)) == 4
+    assert "COLOR_0" not in primitive(gltf, "Plain")[1], "display colours do not tint a material that does not read them"

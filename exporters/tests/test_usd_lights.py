@@ -159,3 +159,16 @@ def test_empty_stage_converts(tmp_path):
     done = subprocess.run([sys.executable, str(SCRIPT), str(tmp_path / "s.usda"), str(tmp_path / "o.glb")], capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
     assert "no camera" in done.stderr
+
+
+def test_stage_without_lights_is_lit_from_the_camera(usd_convert):
+    made = u.stage()
+    prim = u.camera(made)
+    for frame in (1, 5):
+        UsdGeom.XformCommonAPI(prim).SetRotate((0, 10.0 * frame, 0), UsdGeom.XformCommonAPI.RotationOrderXYZ, frame)
+    gltf = usd_convert(made)
+    node = gltf.node("camera light")
+    np.testing.assert_allclose(gltf.world(node, 4), gltf.world(gltf.camera_at(4), 4), atol=1e-6)
+    assert gltf.lost_features("stage.usda") == ["no lights"]
+    dark = usd_convert(made, camera_light=False)
+    assert "KHR_lights_punctual" not in dark.root.get("extensions", {})

@@ -26,6 +26,8 @@ from .textures import Textures
 from .walk import Found, Walker
 
 _DEFAULT_WIDTH = 1280
+# Where the light comes from in a stage without a camera: above and behind the one who looks along -Z.
+_DOWNWARDS = np.array([[[0.8, -0.35, 0.49, 0], [0, 0.81, 0.58, 0], [-0.6, -0.47, 0.65, 0], [0, 0, 0, 1]]])
 
 
 @dataclass
@@ -37,6 +39,7 @@ class Options:
     camera: str | None = None
     variants: list[tuple[str, str, str]] = field(default_factory=list)
     levels: int = 2
+    camera_light: bool = True
     progress: Callable[[str], None] = lambda _line: None
 
 
@@ -210,8 +213,11 @@ class _Conversion:
                 self.lost.add(str(found.prim.GetPath()), "second dome light", "only the first is used; add their images up")
                 continue
             world = write_dome(found.prim, now, self.root @ found.matrix, self.up, self.target, self.lost)
+        cuts = self._cuts()
+        if world is None and not self.lights and self.options.camera_light:
+            self._camera_light(document, animation, cuts)
         animation.close()
-        self._finish(document, world)
+        self._finish(document, world, cuts)
         return Result(self.target, self.lost, document.root)
 
     def _animated(self) -> bool:
@@ -310,8 +316,18 @@ class _Conversion:
             return []
         return [{"frame": self.frames[0], "camera": wanted, "node": tracks[wanted].node}]
 
-    def _finish(self, document: Document, world: dict[str, Any] | None) -> None:
-        cuts = self._cuts()
+    def _camera_light(self, document: Document, animation: motion.Animation, cuts: list[dict[str, Any]]) -> None:
+        """A stage without lights is lit from the camera, as usdview and usdrecord do: white that faces it comes out as 1."""
+        document.use_extension("KHR_lights_punctual")
+        light = {"type": "directional", "name": "camera light", "intensity": extras.LUMENS_PER_WATT * math.pi}
+        document.root.setdefault("extensions", {})["KHR_lights_punctual"] = {"lights": [light]}
+        node: dict[str, Any] = {"name": "camera light", "extensions": {"KHR_lights_punctual": {"light": 0}}}
+        index = document.append("nodes", node)
+        track = next((t for t in self.cameras.values() if cuts and t.node == cuts[0]["node"]), None)
+        animation.node(node, index, np.array(track.poses) if track else _DOWNWARDS)
+        self.lost.add(self.source.name, "no lights", "it is lit from the camera as usdview does; add lights, or pass --no-camera-light")
+
+    def _finish(self, document: Document, world: dict[str, Any] | None, cuts: list[dict[str, Any]]) -> None:
         nodes = document.root.get("nodes", [])
         below = {child for node in nodes for child in node.get("children", [])}
         scene: dict[str, Any] = {"name": self.source.stem}

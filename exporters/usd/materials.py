@@ -44,21 +44,25 @@ class Materials:
     def __init__(self, document: Document, textures: Textures, lost: Lost, time: Usd.TimeCode) -> None:
         self.document, self.textures, self.lost, self.time = document, textures, lost, time
         self._known: dict[tuple, int] = {}
-        self._sets: dict[int, list[str]] = {}
+        self._sets: dict[int, tuple[list[str], bool]] = {}
 
-    def of(self, prim: Usd.Prim, double_sided: bool, names: list[str], plain: tuple[float, ...]) -> tuple[int, list[str]]:
-        """Material of a prim or subset, and the primvars its textures read. `plain`: colour without a material."""
+    def of(self, prim: Usd.Prim, double_sided: bool, names: list[str], plain: tuple[float, ...]) -> tuple[int, list[str], bool]:
+        """Material of a prim or subset, the primvars its textures read, and whether display colours multiply it.
+
+        `plain` is the colour of a prim without a material.
+        """
         material = UsdShade.MaterialBindingAPI(prim).ComputeBoundMaterial()[0]
         path = str(material.GetPath()) if material else ""
         key = (path, double_sided, () if path else plain, tuple(names) if path else ())
         if key not in self._known:
             self._sets_of: list[str] = []
+            self._display = not path
             data = self._material(material, names) if path else _plain(plain)
             if double_sided:
                 data["doubleSided"] = True
             self._known[key] = self.document.append("materials", data)
-            self._sets[self._known[key]] = self._sets_of
-        return self._known[key], self._sets[self._known[key]]
+            self._sets[self._known[key]] = (self._sets_of, self._display)
+        return self._known[key], *self._sets[self._known[key]]
 
     def _material(self, material: UsdShade.Material, names: list[str]) -> dict[str, Any]:
         path = str(material.GetPath())
@@ -266,6 +270,7 @@ class Materials:
                 variable = str(self._value(node, "varname", ""))
                 if variable in ("displayColor", "displayOpacity"):
                     # Vertex colours multiply the base colour in glTF: a factor of 1 gives them alone.
+                    self._display = True
                     return Gf.Vec3f(1) if name == "diffuseColor" else 1.0
                 self.lost.add(path, f"{name} from primvar {variable!r}", "only displayColor and displayOpacity are carried; use a texture")
                 return self._value(node, "fallback", default)

@@ -110,10 +110,11 @@ class Geometries:
         for p in item.primitives:
             names = [k.removeprefix("st:") for k in p.attributes if k.startswith("st:")]
             plain, vertex_colours = _display(p)
-            number, sets = materials.of(p.source, double, names, plain)
-            bound = bool(UsdShade.MaterialBindingAPI(p.source).ComputeBoundMaterial()[0])
+            number, sets, display = materials.of(p.source, double, names, plain)
+            if display and vertex_colours is None and UsdShade.MaterialBindingAPI(p.source).ComputeBoundMaterial()[0]:
+                vertex_colours = np.tile(plain, (len(p.attributes["POSITION"]), 1))
             data: dict[str, Any] = {
-                "attributes": self._attributes(p, sets, vertex_colours if not bound else None, document),
+                "attributes": self._attributes(p, sets, vertex_colours if display else None, document),
                 "indices": document.add_accessor(_small(p.indices), ELEMENT_ARRAY_BUFFER),
                 "material": number,
             }

@@ -58,6 +58,7 @@ def main(argv: list[str]) -> int:
     parser.add_argument("--frames", type=_pair("-"), help="FIRST-LAST time codes (the stage's)")
     parser.add_argument("--resolution", type=_pair("x"), help="WIDTHxHEIGHT (the render settings')")
     parser.add_argument("--subdivision", type=int, default=2, help="levels for subdivision meshes, 0: the cage (2)")
+    parser.add_argument("--no-camera-light", action="store_true", help="leave a stage without lights dark")
     arguments = parser.parse_args(argv)
     job, report = _import()
     options = job.Options(
@@ -66,6 +67,7 @@ def main(argv: list[str]) -> int:
         camera=arguments.camera,
         variants=arguments.variant,
         levels=max(arguments.subdivision, 0),
+        camera_light=not arguments.no_camera_light,
         progress=lambda line: print(f"convert: {line}", flush=True),
     )
     try:
