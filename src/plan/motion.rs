@@ -108,6 +108,10 @@ fn unseen(frame: &PathFrame, neighbour: &PathFrame) -> (f64, f64) {
     (new as f64 / frame.probe.len().max(1) as f64, moved / seen.max(1) as f64)
 }
 
+/// A step so many times as long as the ones beside it is a jump. A hard stop from a fast move stays under it if the move
+/// takes more than one step; taking one for a cut wrongly costs one key frame.
+const JUMP: f64 = 4.0;
+
 /// First frames after a cut: those the scene names, and jumps of the camera.
 ///
 /// A jump is a step many times as long, or as far a turn, as the steps before and after it. A whip pan is none: it
@@ -122,9 +126,9 @@ pub fn find_cuts(path: &[PathFrame], steps: &[Step], named: &[i64]) -> Vec<i64> 
     };
     let is_jump = |i: usize| {
         let depth = median_depth(&path[i]);
-        let leaps = travel(i) > 8.0 * around(i, &travel) && travel(i) > 0.05 * depth;
-        let whirls = turn(i) > 8.0 * around(i, &turn) && turn(i) > 10f64.to_radians();
-        (leaps || whirls) && steps[i].new_forward.max(steps[i].new_backward) > 0.3
+        let leaps = travel(i) > JUMP * around(i, &travel) && travel(i) > 0.05 * depth;
+        let whirls = turn(i) > JUMP * around(i, &turn) && turn(i) > 10f64.to_radians();
+        (leaps || whirls) && steps[i].new_forward.max(steps[i].new_backward) > 0.1
     };
     (0..steps.len())
         .map(|i| (i, path[i + 1].frame))
