@@ -2,7 +2,7 @@
 
 use super::Report;
 use super::report::FrameReport;
-use super::write::write_whole;
+use super::write::write_alone;
 use crate::Result;
 use crate::frame::{PixelClass, RayCounts};
 use std::fmt::Write;
@@ -34,7 +34,7 @@ impl Report {
     /// # Errors
     /// [`crate::Error::Output`].
     pub fn write_html(&self, path: &Path) -> Result<()> {
-        write_whole(path, [self.html().as_bytes()])
+        write_alone(path, self.html().as_bytes())
     }
 
     /// The page.
