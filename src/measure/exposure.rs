@@ -20,7 +20,7 @@ impl Exposure {
         Self::from_p99(percentile.get(0.99))
     }
 
-    /// The colour as it is shown: scaled, clamped to [0,1], sRGB-encoded. NaN is shown black.
+    /// The colour as it is shown: scaled, clamped to 0–1, sRGB-encoded. NaN is shown black.
     pub fn encode(self, [r, g, b, _]: [f32; 4]) -> [f32; 3] {
         [r, g, b].map(|v| srgb(v * self.scale))
     }

@@ -10,7 +10,7 @@ mod flip;
 pub mod picture;
 mod read;
 
-pub use compare::{Comparison, FrameError, MeanError, compare};
+pub use compare::{Comparison, FrameError, MeanError, Unmatched, compare};
 pub use error::{ImageError, image_error, psnr, psnr_where};
 pub use exposure::{Exposure, Percentile};
 pub use flip::{PIXELS_PER_DEGREE, flip_map, flip_mean};

@@ -94,19 +94,20 @@ pub fn scale(picture: &RgbImage, width: u32) -> RgbImage {
 /// The picture as the bytes of a PNG file.
 ///
 /// # Errors
-/// [`Error::Usage`] if the picture is empty or too large for the format.
-pub fn png(picture: &RgbImage) -> Result<Vec<u8>> {
+/// If the picture is empty or too large for the format.
+pub fn png(picture: &RgbImage) -> image::ImageResult<Vec<u8>> {
     let mut bytes = Cursor::new(Vec::new());
-    picture.write_to(&mut bytes, ImageFormat::Png).map_err(|e| Error::Usage(format!("PNG: {e}")))?;
+    picture.write_to(&mut bytes, ImageFormat::Png)?;
     Ok(bytes.into_inner())
 }
 
 /// Writes the picture as a PNG file, whole or not at all.
 ///
 /// # Errors
-/// [`Error::Output`] if the file cannot be written; see also [`png`].
+/// [`Error::Output`] if the file cannot be written or the picture is empty.
 pub fn write_png(picture: &RgbImage, path: &Path) -> Result<()> {
-    write_whole(path, [png(picture)?.as_slice()])
+    let bytes = png(picture).map_err(|e| Error::output(path, e.to_string()))?;
+    write_whole(path, [bytes.as_slice()])
 }
 
 fn draw<T>(values: &[T], width: u32, color: impl Fn(&T) -> [u8; 3]) -> Option<RgbImage> {

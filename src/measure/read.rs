@@ -39,11 +39,15 @@ pub fn read_frame(path: &Path) -> Result<ReadFrame> {
 
     let channel = |name: &str| Text::from(format!("{prefix}{name}").as_str());
     let other = |name: &str| Text::from(name);
-    let width = header.layer_size.width();
-    let pixels = header.layer_size.area();
+    let (width, height) = (header.layer_size.width(), header.layer_size.height());
+    // No compression makes a pixel so small: the header of a damaged file must not decide how much memory is taken.
+    const MOST_PIXELS_A_BYTE: u64 = 4096;
+    let length = std::fs::metadata(path).map_err(|e| fail(e.to_string()))?.len();
+    let pixels = width.checked_mul(height).filter(|&n| n as u64 / MOST_PIXELS_A_BYTE <= length);
+    let pixels = pixels.ok_or_else(|| fail(format!("it is too short for {width}x{height} pixels")))?;
     let empty = ReadFrame {
         width,
-        height: header.layer_size.height(),
+        height,
         color: vec![[0.0; 4]; pixels],
         depth: vec![0.0; if has("depth.Z") { pixels } else { 0 }],
         class: vec![0; if has("pixelClass.id") { pixels } else { 0 }],

@@ -2,7 +2,7 @@
 
 use super::Report;
 use super::report::FrameReport;
-use super::write::write_whole;
+use super::write::write_alone;
 use crate::Result;
 use crate::frame::{PixelClass, RayCounts};
 use std::fmt::Write;
@@ -34,7 +34,7 @@ impl Report {
     /// # Errors
     /// [`crate::Error::Output`].
     pub fn write_html(&self, path: &Path) -> Result<()> {
-        write_whole(path, [self.html().as_bytes()])
+        write_alone(path, self.html().as_bytes())
     }
 
     /// The page.
@@ -67,6 +67,7 @@ impl Report {
             PixelClass::ALL.iter().filter(|c| c.is_reused()).map(|&class| count(&totals.pixels, class)).sum();
         let [numerator, denominator] = settings.fps;
         let fps = f64::from(numerator) / f64::from(denominator.max(1));
+        let fps = if denominator == 1 { numerator.to_string() } else { format!("{fps:.3}") };
         let mut rows = vec![
             (
                 "Frames",
@@ -84,7 +85,7 @@ impl Report {
             (
                 "Settings",
                 format!(
-                    "quality {}, {}×{}, {fps:.3} frames/s, {} threads, anti-aliasing {}",
+                    "quality {}, {}×{}, {fps} frames/s, {} threads, anti-aliasing {}",
                     escaped(&settings.quality),
                     settings.width,
                     settings.height,

@@ -1,6 +1,6 @@
 //! `report.json`: what was asked, what was planned, what was done and what it cost.
 
-use super::write::{explain, write_whole};
+use super::write::write_alone;
 use crate::frame::{FrameKind, FrameStats, PixelClass, RayCounts, StageSeconds};
 use crate::scene::{Ignored, Rational};
 use crate::{Error, Result};
@@ -258,10 +258,7 @@ impl Report {
     pub fn write_json(&self, path: &Path) -> Result<()> {
         let mut json = serde_json::to_string_pretty(self).map_err(|e| Error::output(path, e.to_string()))?;
         json.push('\n');
-        if let Some(folder) = path.parent().filter(|f| !f.as_os_str().is_empty()) {
-            std::fs::create_dir_all(folder).map_err(|e| explain(folder, &e))?;
-        }
-        write_whole(path, [json.as_bytes()])
+        write_alone(path, json.as_bytes())
     }
 }
 

@@ -9,7 +9,7 @@ use super::write::write_whole;
 use crate::frame::{Frame, StageSeconds};
 use crate::sequence::FrameSink;
 use crate::{Error, Result};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::mpsc::{Receiver, Sender, channel};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::thread::JoinHandle;
@@ -128,11 +128,11 @@ impl State {
         self.error.get_or_insert(error);
     }
 
-    fn take_error(&mut self) -> Result<()> {
+    fn take_error(&mut self, folder: &Path) -> Result<()> {
         match self.error.take() {
             Some(error) => Err(error),
             // The error has been reported before; this only stops whoever goes on regardless.
-            None if self.failed => Err(Error::Usage("frames were put into a sink that has failed".into())),
+            None if self.failed => Err(Error::output(folder, "an earlier frame could not be written")),
             None => Ok(()),
         }
     }
@@ -145,7 +145,7 @@ impl FrameSink for ExrSink {
 
     fn put(&mut self, frame: Frame) -> Result<()> {
         let mut state = self.wait(|s| s.in_flight < Self::IN_FLIGHT || s.failed);
-        state.take_error()?;
+        state.take_error(self.folder.path())?;
         state.in_flight += 1;
         drop(state);
         let Some(encoded) = self.encoded.clone() else { return Ok(()) };
@@ -161,7 +161,9 @@ impl FrameSink for ExrSink {
                 Ok(file) => {
                     // The writer lives as long as the sink, and the sink waits for every frame in flight.
                     if encoded.send(Job { number, path, file, seconds }).is_err() {
-                        shared.land(|s| s.fail(Error::output("", "the writer has stopped")));
+                        shared.land(|s| {
+                            s.fail(Error::Frame { frame: number, message: "the writer has stopped".into() })
+                        });
                     }
                 }
                 Err(error) => shared.land(|s| s.fail(error)),
@@ -172,7 +174,7 @@ impl FrameSink for ExrSink {
 
     fn finish(&mut self) -> Result<Vec<(i64, StageSeconds)>> {
         let mut state = self.wait(|s| s.in_flight == 0);
-        state.take_error()?;
+        state.take_error(self.folder.path())?;
         let mut seconds = std::mem::take(&mut state.seconds);
         seconds.sort_by_key(|(number, _)| *number);
         Ok(seconds)

