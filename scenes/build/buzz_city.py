@@ -131,9 +131,9 @@ def check(solids, quadrics):
 
 #: Materials of the towers, all partly reflective; the share that is a mirror is their metallic factor.
 GLASS = {
-    "blue glass": dict(colour=(0.36, 0.52, 0.70), metallic=0.45),
-    "green glass": dict(colour=(0.38, 0.60, 0.52), metallic=0.35),
-    "bronze glass": dict(colour=(0.72, 0.52, 0.34), metallic=0.40),
+    "blue glass": dict(colour=(0.36, 0.52, 0.70), metallic=0.28),
+    "green glass": dict(colour=(0.38, 0.60, 0.52), metallic=0.22),
+    "bronze glass": dict(colour=(0.72, 0.52, 0.34), metallic=0.25),
     "white stone": dict(colour=(0.86, 0.84, 0.80), metallic=0.0),
     "red granite": dict(colour=(0.62, 0.30, 0.26), metallic=0.0),
 }
@@ -289,7 +289,7 @@ def buildings():
         solids.append(Solid(f"House {n}", faces, list(PLASTER)[n % len(PLASTER)]))
     for n, ((x, z), shape) in enumerate(zip(places[HOUSES:], shapes, strict=True)):
         back = (60 - z) / 175
-        height = 11 + 26 * back + 16 * random.random_sample() ** 2
+        height = 10 + 23 * back + 15 * random.random_sample() ** 2
         faces = tower(shape, x, z, 4.4 + 1.2 * random.random_sample(), height)
         solids.append(Solid(f"Tower {n} {shape}", faces, list(GLASS)[random.randint(len(GLASS))]))
     return solids

@@ -10,7 +10,7 @@ import camera
 import mesh
 import texture
 from gltf import Scene
-from mesh import box, cards, disc, join, lathe, quad, sphere, unit, wall
+from mesh import box, cards, disc, join, lathe, polygon, quad, sphere, unit, wall
 from texture import courses, mix, noise, normal_map, ramp, smoothstep
 
 FRAMES = 96
@@ -30,7 +30,7 @@ def build():
     materials = make_materials(scene)
     for part in (ground, buildings, roofs, tower, fountain, well, greenery, furniture, lanterns):
         part(scene, materials)
-    scene.sun("Sun", direction=(0.55, -0.75, -0.42), watts_per_m2=4.2, colour=(1.0, 0.91, 0.78))
+    scene.sun("Sun", direction=(0.55, -0.75, -0.42), watts_per_m2=3.7, colour=(1.0, 0.91, 0.78))
     move_camera(scene)
     return scene
 
@@ -48,7 +48,7 @@ def masonry(scene):
     edge, tone = courses(512, 7, 5, seed=11, jitter=0.7)
     grain = noise(512, 8, seed=12, octaves=5)
     stone = smoothstep(0.001, 0.006, edge)
-    colour = ramp(0.65 * tone + 0.35 * grain, (0.45, 0.41, 0.36), (0.62, 0.57, 0.49), (0.73, 0.67, 0.58))
+    colour = ramp(0.65 * tone + 0.35 * grain, (0.47, 0.42, 0.35), (0.63, 0.56, 0.46), (0.74, 0.66, 0.54))
     colour = mix(np.full_like(colour, 0.27) * [1.0, 0.98, 0.85], colour, stone) * (0.84 + 0.32 * grain[..., None])
     relief = 0.7 * smoothstep(0.0, 0.012, edge) + 0.35 * grain + 0.15 * tone
     # Worn stones are smoother than the joints between them.
@@ -197,7 +197,7 @@ def north_side(scene, materials, window, door):
     back = wall(2 * EAST, EAVE + 0.3, doors + upper, 0.25, tile=2.0).moved((-EAST, 0, z))
     top, front = ARCH_TOP - 0.4, -NORTH - 0.5
     ceiling = quad((-EAST, top, z), (EAST, top, z), (EAST, top, front), (-EAST, top, front))
-    beams = [box((x - 0.09, top - 0.22, z), (x + 0.09, top, front), skip="zZY") for x in np.arange(-9.5, 9.6, 1.0)]
+    beams = [box((x - 0.09, top - 0.22, z), (x + 0.09, top, front), skip="zY") for x in np.arange(-9.5, 9.6, 1.0)]
     scene.node("North wall", mesh=scene.mesh("North wall", (back, materials["plaster"])))
     scene.node("Ceiling", mesh=scene.mesh("Ceiling", (join([ceiling, *beams]), materials["wood"])))
 
@@ -302,15 +302,13 @@ def tile_column(tiles, length=0.42):
     pieces = []
     for i in range(tiles):
         near, far = -length * i + 0.04, -length * (i + 1)
-        # The lower end of a tile lies on the one below it.
+        # The lower end of a tile lies on the one below it, and is closed as if filled with mortar.
         low = np.column_stack([arc * 1.06 + [0, 0.045], np.full(7, near)])
         high = np.column_stack([arc * 0.92 + [0, 0.005], np.full(7, far)])
-        pieces.append(mesh.strip(low, high, 0.9, smooth=True))
-        # The rim that shows the tile's thickness, and a different patch of the texture for every tile.
-        rim = np.column_stack([arc * 0.9 + [0, 0.03], np.full(7, near)])
-        pieces.append(mesh.strip(rim, low, 0.9))
-        for piece in pieces[-2:]:
-            piece.uvs = piece.uvs + [0.37 * i, 0.61 * i]
+        tile = join([mesh.strip(high, low, 0.9, smooth=True), polygon(low[::-1], 0.9)])
+        # Every tile shows a different patch of the texture.
+        tile.uvs += [0.37 * i, 0.61 * i]
+        pieces.append(tile)
     bed = quad((-0.125, -0.01, 0), (0.125, -0.01, 0), (0.125, -0.01, -length * tiles), (-0.125, -0.01, -length * tiles))
     return join([*pieces, bed])
 
@@ -344,7 +342,7 @@ def tower(scene, materials):
     pier = box((1.0, shaft_top, 1.0), (1.8, shaft_top + 1.6, 1.8), 2.0, skip="yY")
     belfry = join(part.moved(turn=turn) for part in (side, pier) for turn in (0, 90, 180, 270))
     corners = [(-2.1, 16.2, 2.1), (2.1, 16.2, 2.1), (2.1, 16.2, -2.1), (-2.1, 16.2, -2.1)]
-    spire = join(mesh.polygon([corners[i], corners[(i + 1) % 4], (0, 18.6, 0)], 1.0) for i in range(4))
+    spire = join(polygon([corners[i], corners[(i + 1) % 4], (0, 18.6, 0)], 1.0) for i in range(4))
     bell = lathe([(0.45, 0), (0.38, 0.15), (0.3, 0.45), (0.24, 0.65), (0.0, 0.75)], 24).moved((0, 13.6, 0))
     finial = join([lathe([(0.04, 18.4), (0.04, 19.5), (0.0, 19.6)], 8), sphere(10, 16, 0.16).moved((0, 19.0, 0))])
     parts = scene.mesh(
@@ -397,15 +395,16 @@ def well(scene, materials):
     rope = rope.moved((0.1, 0, 0.1))
     bucket = lathe([(0.0, 1.25), (0.13, 1.25), (0.13, 1.25), (0.17, 1.55)], 16).moved((0.1, -0.25, 0.1))
     pail = join([bucket, lathe([(0.16, 1.55), (0.12, 1.27), (0.0, 1.27)], 16).moved((0.1, -0.25, 0.1))])
-    tiles = tile_column(2, length=0.5).transformed(mesh.rotation_x(32))
-    slope = [tiles.moved((x, 2.42, 0.88)) for x in np.arange(-0.875, 0.9, 0.25)]
-    roof = join(slope)
+    columns = [tile_column(2, length=0.5).moved((x, 0, 0)) for x in np.arange(-0.875, 0.9, 0.25)]
+    boards = box((-1.0, -0.06, -1.0), (1.0, -0.02, -0.02), 1.0)
+    slope, eave = mesh.rotation_x(32), (0, 2.42, 0.88)
+    roof, boards = join(columns).transformed(slope, eave), boards.transformed(slope, eave)
     water = disc(0.58, 32, 0.3)
     parts = scene.mesh(
         "Well",
         (join([wall_ring, inside]), materials["brick"]),
         (rim, materials["limestone"]),
-        (join([posts, drum, ridge, rope, pail]), materials["wood"]),
+        (join([posts, drum, ridge, rope, pail, boards, boards.moved(turn=180)]), materials["wood"]),
         (join([roof, roof.moved(turn=180)]), materials["tiles"]),
         (water, materials["water"]),
     )
@@ -501,13 +500,13 @@ def ivy(random, count=1500):
 def furniture(scene, materials):
     """Benches by the fountain, barrels and crates by the east door."""
     slats = [box((-0.9, 0.42, z), (0.9, 0.47, z + 0.12), 1.0) for z in (-0.22, -0.06, 0.10)]
-    legs = [box((x, 0, -0.2), (x + 0.1, 0.42, 0.2), skip="yY") for x in (-0.75, 0.65)]
+    legs = [box((x, 0, -0.2), (x + 0.1, 0.42, 0.2), skip="y") for x in (-0.75, 0.65)]
     bench = scene.mesh("Bench", (join(slats), materials["wood"]), (join(legs), materials["limestone"]))
     for i, (x, z, turn) in enumerate([(-3.6, 0, 90), (3.6, 0.4, -90), (0, -3.7, 0)]):
         scene.node(f"Bench {i}", (x, 0, z), turn=turn, mesh=bench)
 
     staves = lathe([(0.24, 0), (0.31, 0.25), (0.33, 0.45), (0.31, 0.65), (0.24, 0.9)], 24)
-    lid = disc(0.24, 24, 0.88)
+    lid = disc(0.24, 24, 0.895)
     hoops = join(
         lathe([(r, y), (r, y + 0.05)], 24) for r, y in ((0.29, 0.12), (0.334, 0.34), (0.334, 0.52), (0.29, 0.73))
     )
@@ -529,7 +528,9 @@ def lanterns(scene, materials):
     bars = [
         box((x - 0.012, -0.2, z - 0.012), (x + 0.012, 0.2, z + 0.012)) for x in (-0.13, 0.13) for z in (-0.13, 0.13)
     ]
-    cap = lathe([(0.24, 0.2), (0.2, 0.24), (0.08, 0.36), (0.03, 0.4), (0.03, 0.46), (0.0, 0.48)], 4)
+    cap = lathe(
+        [(0.0, 0.2), (0.24, 0.2), (0.24, 0.2), (0.2, 0.24), (0.08, 0.36), (0.03, 0.4), (0.03, 0.46), (0.0, 0.48)], 4
+    )
     rim = join(
         [
             box((-0.15, -0.22, 0.11), (0.15, -0.2, 0.15)),
@@ -545,7 +546,7 @@ def lanterns(scene, materials):
     for name, x in (("west", -2.0), ("east", 6.0)):
         place = np.array([x, 2.9, -NORTH + 0.42])
         scene.node(f"Lantern {name}", place, mesh=lantern)
-        scene.lamp(f"Lamp {name}", place + [0, -0.02, 0], watts=160, colour=(1.0, 0.68, 0.36))
+        scene.lamp(f"Lamp {name}", place + [0, -0.02, 0], watts=60, colour=(1.0, 0.68, 0.36))
 
 
 # ---- sky and camera
@@ -589,5 +590,5 @@ def move_camera(scene):
         yfov=np.radians(48),
         fps=24,
         resolution=(1280, 720),
-        world={"strength": 1.15, "image": scene.picture("sky", sky(256), step=1)},
+        world={"strength": 1.0, "image": scene.picture("sky", sky(256), step=1)},
     )

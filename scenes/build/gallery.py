@@ -98,8 +98,8 @@ def hall(scene, materials):
     # The skylight is a recess between two strips of ceiling, crossed by beams.
     strips = [quad((x0, h, far), (x1, h, far), (x1, h, near), (x0, h, near)) for x0, x1 in ((-w, -1.3), (1.3, w))]
     cheeks = [
-        quad((-1.3, h, far), (-1.3, h, near), (-1.3, h + 0.5, near), (-1.3, h + 0.5, far)),
-        quad((1.3, h, near), (1.3, h, far), (1.3, h + 0.5, far), (1.3, h + 0.5, near)),
+        quad((-1.3, h, near), (-1.3, h, far), (-1.3, h + 0.5, far), (-1.3, h + 0.5, near)),
+        quad((1.3, h, far), (1.3, h, near), (1.3, h + 0.5, near), (1.3, h + 0.5, far)),
         quad((-1.3, h, far), (1.3, h, far), (1.3, h + 0.5, far), (-1.3, h + 0.5, far)),
         quad((1.3, h, near), (-1.3, h, near), (-1.3, h + 0.5, near), (1.3, h + 0.5, near)),
     ]
@@ -122,7 +122,7 @@ def frame(width, height, bar=0.11, depth=0.07):
     profile = [(0.0, 0.0), (0.0, depth), (bar * 0.35, depth * 0.7), (bar * 0.7, depth), (bar, 0.0)]
     corners = [(-1, -1), (1, -1), (1, 1), (-1, 1), (-1, -1)]
     loops = [[(sx * (width / 2 + out), sy * (height / 2 + out), z) for sx, sy in corners] for out, z in profile]
-    return join(mesh.strip(outer, inner) for inner, outer in itertools.pairwise(loops))
+    return join(mesh.strip(inner, outer) for inner, outer in itertools.pairwise(loops))
 
 
 def picture(width, height):
