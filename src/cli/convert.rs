@@ -38,6 +38,12 @@ pub fn run(args: ConvertArgs) -> Result<ExitCode> {
 
     let hash = settings_hash(&job, &args);
     let folder = OutputFolder::open(out_dir, names, frames.iter().copied())?;
+    if !folder.is_locked() {
+        let path = folder.path().display();
+        eprintln!(
+            "buzz-convert: warning: {path}: the file system has no locks: do not run twice on the same frames"
+        );
+    }
     let skipped = existing(&folder, &frames, &hash, &args)?;
     let to_render: BTreeSet<i64> =
         frames.difference(&skipped.iter().map(|r| r.number).collect()).copied().collect();
@@ -85,6 +91,7 @@ pub fn run(args: ConvertArgs) -> Result<ExitCode> {
     let whole = frames == (timing.first..=timing.last).collect();
     let path = args.output.report.clone().unwrap_or_else(|| out_dir.join(report_name(&frames, whole)));
     report.write_json(&path)?;
+    report.write_html(&path.with_extension("html"))?;
     summarise(&report);
     Ok(ExitCode::SUCCESS)
 }
