@@ -156,6 +156,8 @@ def _bake(scene: bpy.types.Scene, folder: Path, stem: str) -> str:
     sky.render.image_settings.file_format = "OPEN_EXR"
     sky.render.image_settings.color_depth = "16"
     sky.render.filepath = str(target)
+    # Nothing is lit here, so Cycles need not work out where the sky is bright.
+    scene.world.cycles.sampling_method = "NONE"
     sky.frame_set(scene.frame_current)
     bpy.ops.render.render(write_still=True, scene=sky.name)
     bpy.data.scenes.remove(sky)

@@ -123,6 +123,7 @@ def cycles_colours(blender, tmp_path) -> dict[float, np.ndarray]:
     scene = blender.context.scene
     scene.render.engine = "CYCLES"
     scene.cycles.samples, scene.cycles.use_denoising = 1, False
+    scene.world.cycles.sampling_method = "NONE"
     scene.render.resolution_x = scene.render.resolution_y = 9
     scene.render.image_settings.file_format = "OPEN_EXR"
     out = {}
