@@ -585,6 +585,31 @@ fn materials_keep_their_factors_and_extensions() {
 }
 
 #[test]
+fn specular_glossiness_becomes_a_dielectric_of_the_same_reflectance() {
+    let mut gltf = Gltf::with_triangle();
+    gltf.json["meshes"][0]["primitives"][0]["material"] = json!(0);
+    let extension =
+        json!({"diffuseFactor": [0.5, 0, 0, 1], "specularFactor": [0.04, 0.02, 1], "glossinessFactor": 0.75});
+    gltf.push("materials", json!({"extensions": {"KHR_materials_pbrSpecularGlossiness": extension}}));
+    let scene = gltf.scene();
+    let material = &scene.materials[0];
+    assert_eq!((material.metallic, material.roughness, material.base_color.x), (0.0, 0.25, 0.5));
+    assert!((material.specular_color - Vec3::new(1.0, 0.5, 25.0)).length() < 1e-5);
+}
+
+#[test]
+fn a_buffer_file_named_many_times_is_read_once() {
+    let folder = TempDir::new().unwrap();
+    let mut gltf = Gltf::with_triangle();
+    gltf.bytes.resize(1 << 20, 0);
+    fs::write(folder.path().join("a.bin"), &gltf.bytes).unwrap();
+    gltf.json["buffers"] = vec![json!({"byteLength": 36, "uri": "a.bin"}); 20_000].into();
+    let file = folder.path().join("scene.gltf");
+    fs::write(&file, gltf.text()).unwrap();
+    assert_eq!(import(&file, &ImportOptions::default()).unwrap().triangle_count(), 1);
+}
+
+#[test]
 fn texture_transforms_and_samplers_are_read() {
     let uri = format!("data:image/png;base64,{}", base64(&png(2, 2)));
     let mut gltf = textured(&uri);
