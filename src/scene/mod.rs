@@ -5,8 +5,10 @@
 //! +Y up, metres; a camera and a spot light look along their node's -Z. Light is radiometric (W/sr, W/m2, W/m2/sr
 //! with Rec.709 primaries), as Blender's is: the importer divides glTF's photometric units by 683 lm/W.
 
+mod build;
 mod camera;
 mod curve;
+mod digest;
 mod light;
 mod material;
 mod mesh;
@@ -15,13 +17,13 @@ mod requirements;
 mod texture;
 mod timing;
 
-pub use camera::{Camera, Lens, Projection, View};
+pub use camera::{Camera, CameraRay, Lens, Projection, View};
 pub use curve::{Channel, Curve, Interpolation, Target};
 pub use light::{Light, LightKind, PosedLight, World};
 pub use material::{AlphaMode, Material, NormalTexture, Volume};
 pub use mesh::{Instance, Mesh, MorphTarget, Skin};
 pub use pose::{LocalTransform, Node, Pose};
-pub use requirements::Requirements;
+pub use requirements::{MIRROR_ROUGHNESS, Requirements};
 pub use texture::{ColorSpace, Image, TextureRef, Wrap};
 pub use timing::{Cut, Rational, Timing};
 

@@ -135,6 +135,28 @@ impl Scene {
         Pose { world_from_node, visible, weights, lights, lenses }
     }
 
+    /// The camera that frame `frame` is seen through: `chosen` if given, else the scene's cuts, else the first
+    /// animated camera, else the first.
+    ///
+    /// Before the first cut its camera is used already, as Blender does with markers.
+    pub fn camera_at(&self, frame: i64, chosen: Option<usize>) -> usize {
+        let by_cut = || {
+            let last = self.cuts.iter().rev().find(|c| c.frame <= frame);
+            last.or(self.cuts.first()).map(|c| c.camera)
+        };
+        chosen.or_else(by_cut).or_else(|| self.first_animated_camera()).unwrap_or(0)
+    }
+
+    fn first_animated_camera(&self) -> Option<usize> {
+        let moved = self.moved_nodes();
+        let zooms = |camera: usize| {
+            self.channels.iter().any(|c| {
+                matches!(c.target, Target::CameraYfov(i) | Target::CameraXmag(i) | Target::CameraYmag(i) if i == camera)
+            })
+        };
+        (0..self.cameras.len()).find(|&c| moved[self.cameras[c].node] || zooms(c))
+    }
+
     /// What camera number `camera` sees in `pose`, on an image of `width` x `height` pixels.
     ///
     /// Position and direction come from the node; scale does not (nor does it change the lens). Right and up are

@@ -1,6 +1,7 @@
 //! Images with mip levels, and how materials look them up.
 
-use glam::{Affine2, Vec2, Vec4};
+use glam::{Affine2, Vec2, Vec3, Vec4};
+use std::sync::LazyLock;
 
 /// Whether an image's values are encoded for display.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -41,28 +42,407 @@ pub struct TextureRef {
 }
 
 /// An image and its mip levels (each half the size, box-filtered in linear light).
+///
+/// Eight bits a channel are kept as they came; so four bytes a texel, and a third more for the levels.
 #[derive(Debug, Clone)]
 pub struct Image {
     /// For messages.
     pub name: String,
+    /// The full size first, then halves down to 1x1.
+    levels: Vec<Level>,
+    texels: Texels,
+}
+
+/// Where a mip level is among an image's texels.
+#[derive(Debug, Clone, Copy)]
+struct Level {
+    width: u32,
+    height: u32,
+    first: usize,
+}
+
+/// Texels of all levels, rows from the top.
+#[derive(Debug, Clone)]
+enum Texels {
+    Bytes(Vec<[u8; 4]>, ColorSpace),
+    Floats(Vec<[f32; 3]>),
 }
 
 impl Image {
-    /// Makes an image from 8-bit RGBA, rows from the top.
+    /// Makes an image from 8-bit RGBA, rows from the top. With no texels, or fewer than its size asks for, it is
+    /// one white texel.
+    ///
+    /// Where the values are colours, smaller levels weigh them by alpha, so that what lies under the cut-out parts
+    /// of a leaf does not bleed into it.
     pub fn from_rgba8(name: &str, width: u32, height: u32, texels: Vec<[u8; 4]>, space: ColorSpace) -> Self {
-        let _ = (width, height, texels, space);
-        Self { name: name.to_owned() }
+        let (width, height, mut texels) = whole(width, height, texels, [255; 4]);
+        let levels = levels_of(width, height);
+        for pair in levels.windows(2) {
+            halve(pair[0], pair[1], &mut texels, |block| average_bytes(block, space));
+        }
+        Self { name: name.to_owned(), levels, texels: Texels::Bytes(texels, space) }
     }
 
-    /// Makes an image from linear floats (HDR), rows from the top.
+    /// Makes an image from linear floats (HDR), rows from the top. With no texels, or fewer than its size asks for,
+    /// it is one white texel. Values that are not finite count as 0.
     pub fn from_rgb_f32(name: &str, width: u32, height: u32, texels: Vec<[f32; 3]>) -> Self {
-        let _ = (width, height, texels);
-        Self { name: name.to_owned() }
+        let (width, height, mut texels) = whole(width, height, texels, [1.0; 3]);
+        for value in texels.as_flattened_mut() {
+            *value = if value.is_finite() { *value } else { 0.0 };
+        }
+        let levels = levels_of(width, height);
+        for pair in levels.windows(2) {
+            halve(pair[0], pair[1], &mut texels, |block| {
+                let sum = block.iter().fold(Vec3::ZERO, |sum, &texel| sum + Vec3::from(texel));
+                (sum / block.len() as f32).to_array()
+            });
+        }
+        Self { name: name.to_owned(), levels, texels: Texels::Floats(texels) }
+    }
+
+    /// Width and height in texels.
+    pub fn size(&self) -> (u32, u32) {
+        (self.levels[0].width, self.levels[0].height)
+    }
+
+    /// See [`super::Scene::digest`].
+    pub(super) fn digest(&self, feed: &mut dyn FnMut(&str, &[u8])) {
+        feed("image", format!("{} {:?}", self.name, self.size()).as_bytes());
+        match &self.texels {
+            Texels::Bytes(texels, space) => {
+                feed("space", format!("{space:?}").as_bytes());
+                feed("texels", texels.as_flattened());
+            }
+            Texels::Floats(texels) => feed("texels", bytemuck::cast_slice(texels)),
+        }
+    }
+
+    /// Memory that the texels take.
+    pub fn memory_bytes(&self) -> u64 {
+        match &self.texels {
+            Texels::Bytes(texels, _) => size_of_val(texels.as_slice()) as u64,
+            Texels::Floats(texels) => size_of_val(texels.as_slice()) as u64,
+        }
     }
 
     /// The linear RGBA value at `uv` (image space), averaged over a square of side `footprint` (in units of uv).
+    ///
+    /// Bilinear within a level and linear between two, or the nearest texel of the nearest level. A footprint below
+    /// one texel reads the full image.
     pub fn sample(&self, texture: &TextureRef, uv: Vec2, footprint: f32) -> Vec4 {
-        let _ = (texture, uv, footprint);
-        Vec4::ONE
+        let (width, height) = self.size();
+        let texels = footprint * (width as f32 * height as f32).sqrt();
+        let last = self.levels.len() - 1;
+        if texture.nearest {
+            let level = if texels > 1.0 { (log2(texels) + 0.5) as usize } else { 0 };
+            return self.nearest(texture, self.levels[level.min(last)], uv);
+        }
+        // NaN compares false and reads the full image.
+        if texels > 1.0 {
+            let lod = log2(texels);
+            let fine = (lod as usize).min(last);
+            let coarse = (fine + 1).min(last);
+            let a = self.bilinear(texture, self.levels[fine], uv);
+            if coarse == fine {
+                return a;
+            }
+            let b = self.bilinear(texture, self.levels[coarse], uv);
+            return a + (b - a) * (lod - fine as f32);
+        }
+        self.bilinear(texture, self.levels[0], uv)
+    }
+
+    fn nearest(&self, texture: &TextureRef, level: Level, uv: Vec2) -> Vec4 {
+        let (x, y) = (
+            floor(wrapped(texture.wrap_u, uv.x) * level.width as f32),
+            floor(wrapped(texture.wrap_v, uv.y) * level.height as f32),
+        );
+        let x = neighbour(texture.wrap_u, x, level.width);
+        let y = neighbour(texture.wrap_v, y, level.height);
+        let [texel] = self.texels([level.first + (y * level.width + x) as usize]);
+        texel
+    }
+
+    fn bilinear(&self, texture: &TextureRef, level: Level, uv: Vec2) -> Vec4 {
+        let x = wrapped(texture.wrap_u, uv.x) * level.width as f32 - 0.5;
+        let y = wrapped(texture.wrap_v, uv.y) * level.height as f32 - 0.5;
+        let (x0, y0) = (floor(x), floor(y));
+        let (fx, fy) = (x - x0 as f32, y - y0 as f32);
+        let left = neighbour(texture.wrap_u, x0, level.width) as usize;
+        let right = neighbour(texture.wrap_u, x0 + 1, level.width) as usize;
+        let top = level.first + (neighbour(texture.wrap_v, y0, level.height) * level.width) as usize;
+        let bottom = level.first + (neighbour(texture.wrap_v, y0 + 1, level.height) * level.width) as usize;
+        let [a, b, c, d] = self.texels([top + left, top + right, bottom + left, bottom + right]);
+        let (upper, lower) = (a + (b - a) * fx, c + (d - c) * fx);
+        upper + (lower - upper) * fy
+    }
+
+    /// Linear values of some texels.
+    #[inline]
+    fn texels<const N: usize>(&self, indices: [usize; N]) -> [Vec4; N] {
+        match &self.texels {
+            Texels::Bytes(texels, space) => {
+                let table = linear_from_code(*space);
+                indices.map(|i| {
+                    let [r, g, b, a] = texels[i].map(usize::from);
+                    Vec4::new(table[r], table[g], table[b], LINEAR_FROM_BYTE[a])
+                })
+            }
+            Texels::Floats(texels) => indices.map(|i| Vec3::from(texels[i]).extend(1.0)),
+        }
+    }
+}
+
+/// `uv` brought near [0, 1], so that texel numbers stay exact however often a texture is tiled.
+#[inline]
+fn wrapped(wrap: Wrap, u: f32) -> f32 {
+    match wrap {
+        Wrap::Repeat => u - whole_part(u),
+        Wrap::Mirror => {
+            let u = u - 2.0 * whole_part(u * 0.5);
+            if u > 1.0 { 2.0 - u } else { u }
+        }
+        Wrap::Clamp => u.clamp(0.0, 1.0),
+    }
+}
+
+/// The texel that stands at `x`, which is at most one texel outside the image.
+#[inline]
+fn neighbour(wrap: Wrap, x: i32, size: u32) -> u32 {
+    let size = size as i32;
+    let x = match wrap {
+        Wrap::Repeat if x < 0 => size - 1,
+        Wrap::Repeat if x >= size => 0,
+        // Mirrored at the border, the texel beyond it is the border's own.
+        _ => x,
+    };
+    x.clamp(0, size - 1) as u32
+}
+
+/// `f32::floor` without a call into the C library, which it is on plain x86-64.
+#[inline]
+fn floor(x: f32) -> i32 {
+    let i = x as i32;
+    i - i32::from(x < i as f32)
+}
+
+/// The integer at or below `x`; beyond 2^23 floats are integers themselves.
+#[inline]
+fn whole_part(x: f32) -> f32 {
+    if x.abs() < 8_388_608.0 { floor(x) as f32 } else { x }
+}
+
+/// Logarithm to base 2 of a normal positive number, straight between powers of two: never off by more than 0.09,
+/// and a mip level blends straight anyway.
+#[inline]
+fn log2(x: f32) -> f32 {
+    x.to_bits() as f32 / 8_388_608.0 - 127.0
+}
+
+/// `texels`, checked against the size that they should have.
+fn whole<T: Copy>(width: u32, height: u32, mut texels: Vec<T>, white: T) -> (u32, u32, Vec<T>) {
+    let size = width as usize * height as usize;
+    if size == 0 || texels.len() < size {
+        return (1, 1, vec![white]);
+    }
+    texels.truncate(size);
+    (width, height, texels)
+}
+
+/// All levels of an image, each half the one before, down to 1x1.
+fn levels_of(width: u32, height: u32) -> Vec<Level> {
+    let mut levels = vec![Level { width, height, first: 0 }];
+    let mut level = levels[0];
+    while level.width > 1 || level.height > 1 {
+        let first = level.first + level.width as usize * level.height as usize;
+        level = Level { width: (level.width / 2).max(1), height: (level.height / 2).max(1), first };
+        levels.push(level);
+    }
+    levels
+}
+
+/// Appends level `to`, each texel the average of those of `from` that it covers: two a side, or up to three where
+/// the size is odd.
+fn halve<T: Copy>(from: Level, to: Level, texels: &mut Vec<T>, average: impl Fn(&[T]) -> T) {
+    let span = |i: u32, from: u32, to: u32| {
+        let first = u64::from(i) * u64::from(from) / u64::from(to);
+        let last = (u64::from(i + 1) * u64::from(from)).div_ceil(u64::from(to));
+        first as usize..last as usize
+    };
+    texels.reserve(to.width as usize * to.height as usize);
+    let mut block = Vec::with_capacity(9);
+    for y in 0..to.height {
+        for x in 0..to.width {
+            block.clear();
+            for row in span(y, from.height, to.height) {
+                let columns = span(x, from.width, to.width);
+                let row = from.first + row * from.width as usize;
+                block.extend_from_slice(&texels[row + columns.start..row + columns.end]);
+            }
+            texels.push(average(&block));
+        }
+    }
+}
+
+/// The average of 8-bit texels in linear light; colours weighed by alpha.
+fn average_bytes(block: &[[u8; 4]], space: ColorSpace) -> [u8; 4] {
+    let (mut color, mut weighed, mut alpha) = (Vec3::ZERO, Vec3::ZERO, 0.0);
+    let table = linear_from_code(space);
+    for &[r, g, b, a] in block {
+        let rgb = Vec3::from([r, g, b].map(|c| table[usize::from(c)]));
+        color += rgb;
+        weighed += rgb * LINEAR_FROM_BYTE[usize::from(a)];
+        alpha += LINEAR_FROM_BYTE[usize::from(a)];
+    }
+    let n = block.len() as f32;
+    let rgb = if space == ColorSpace::Srgb && alpha > 0.0 { weighed / alpha } else { color / n };
+    let encode = |x: f32| match space {
+        ColorSpace::Srgb => SRGB_FROM_LINEAR[(x * SRGB_STEPS as f32 + 0.5) as usize],
+        ColorSpace::Linear => (x * 255.0 + 0.5) as u8,
+    };
+    let [r, g, b] = rgb.to_array().map(encode);
+    [r, g, b, (alpha / n * 255.0 + 0.5) as u8]
+}
+
+/// Linear value of each 8-bit sRGB code.
+static LINEAR_FROM_SRGB: LazyLock<[f32; 256]> = LazyLock::new(|| {
+    std::array::from_fn(|i| {
+        let x = i as f64 / 255.0;
+        (if x <= 0.04045 { x / 12.92 } else { ((x + 0.055) / 1.055).powf(2.4) }) as f32
+    })
+});
+
+/// Linear value of each 8-bit code that is linear itself.
+static LINEAR_FROM_BYTE: [f32; 256] = {
+    let mut table = [0.0; 256];
+    let mut i = 0;
+    while i < 256 {
+        table[i] = i as f32 / 255.0;
+        i += 1;
+    }
+    table
+};
+
+/// The table for a colour space.
+fn linear_from_code(space: ColorSpace) -> &'static [f32; 256] {
+    match space {
+        ColorSpace::Srgb => &LINEAR_FROM_SRGB,
+        ColorSpace::Linear => &LINEAR_FROM_BYTE,
+    }
+}
+
+/// Steps of the table below: fine enough that no code is off by more than half near black, where sRGB is steep.
+const SRGB_STEPS: usize = 1 << 14;
+
+/// 8-bit sRGB code of a linear value in [0, 1], in steps of 1 / [`SRGB_STEPS`].
+static SRGB_FROM_LINEAR: LazyLock<Vec<u8>> = LazyLock::new(|| {
+    let encode = |i: usize| {
+        let x = i as f64 / SRGB_STEPS as f64;
+        let x = if x <= 0.003_130_8 { x * 12.92 } else { 1.055 * x.powf(1.0 / 2.4) - 0.055 };
+        (x * 255.0 + 0.5) as u8
+    };
+    (0..=SRGB_STEPS).map(encode).collect()
+});
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use glam::vec2;
+
+    fn texture(wrap: Wrap) -> TextureRef {
+        let transform = Affine2::IDENTITY;
+        TextureRef { image: 0, uv_set: 0, transform, wrap_u: wrap, wrap_v: wrap, nearest: false }
+    }
+
+    fn checker(size: u32) -> Image {
+        let texel = |i: u32| if (i % size + i / size).is_multiple_of(2) { [255; 4] } else { [0, 0, 0, 255] };
+        let texels = (0..size * size).map(texel).collect();
+        Image::from_rgba8("checker", size, size, texels, ColorSpace::Srgb)
+    }
+
+    #[test]
+    fn a_texel_is_read_exactly_at_its_centre() {
+        let image = checker(8);
+        for wrap in [Wrap::Repeat, Wrap::Mirror, Wrap::Clamp] {
+            assert_eq!(image.sample(&texture(wrap), vec2(0.5 / 8.0, 0.5 / 8.0), 0.0), Vec4::ONE);
+            assert_eq!(
+                image.sample(&texture(wrap), vec2(1.5 / 8.0, 0.5 / 8.0), 0.0),
+                Vec4::new(0.0, 0.0, 0.0, 1.0)
+            );
+        }
+    }
+
+    #[test]
+    fn a_large_footprint_averages_in_linear_light() {
+        let image = checker(64);
+        for footprint in [0.25, 1.0, 1e6, f32::INFINITY] {
+            let grey = image.sample(&texture(Wrap::Repeat), vec2(0.3, 0.7), footprint);
+            assert!((grey.x - 0.5).abs() < 0.005, "{footprint}: {grey}");
+        }
+    }
+
+    #[test]
+    fn levels_blend_continuously() {
+        let texels = (0..256u32).map(|i| [(i * 37 % 256) as u8, 0, 0, 255]).collect();
+        let image = Image::from_rgba8("noise", 16, 16, texels, ColorSpace::Linear);
+        let mut last = image.sample(&texture(Wrap::Repeat), vec2(0.31, 0.77), 0.01);
+        for i in 1..2000 {
+            let next = image.sample(&texture(Wrap::Repeat), vec2(0.31, 0.77), 0.01 + i as f32 * 0.001);
+            assert!(last.distance(next) < 0.02);
+            last = next;
+        }
+    }
+
+    #[test]
+    fn wraps_repeat_mirror_and_clamp() {
+        let texels = vec![[0, 0, 0, 255], [255, 255, 255, 255]];
+        let image = Image::from_rgba8("two", 2, 1, texels, ColorSpace::Linear);
+        let at = |wrap, u| image.sample(&texture(wrap), vec2(u, 0.5), 0.0).x;
+        assert_eq!(
+            (at(Wrap::Repeat, 1.25), at(Wrap::Repeat, -0.25), at(Wrap::Repeat, 7.75)),
+            (0.0, 1.0, 1.0)
+        );
+        assert_eq!(
+            (at(Wrap::Mirror, 1.25), at(Wrap::Mirror, -0.25), at(Wrap::Mirror, 2.25)),
+            (1.0, 0.0, 0.0)
+        );
+        assert_eq!((at(Wrap::Clamp, 1.25), at(Wrap::Clamp, -0.25)), (1.0, 0.0));
+        // Half way between the last texel and the first.
+        assert_eq!((at(Wrap::Repeat, 1.0), at(Wrap::Mirror, 1.0)), (0.5, 1.0));
+    }
+
+    #[test]
+    fn hidden_colours_do_not_bleed_into_smaller_levels() {
+        let texels = vec![[0, 255, 0, 255], [255, 0, 0, 0], [255, 0, 0, 0], [255, 0, 0, 0]];
+        let image = Image::from_rgba8("leaf", 2, 2, texels, ColorSpace::Srgb);
+        let small = image.sample(&texture(Wrap::Clamp), vec2(0.5, 0.5), 1.0e3);
+        assert_eq!((small.x, small.y), (0.0, 1.0));
+        assert!((small.w - 0.25).abs() < 0.01);
+    }
+
+    #[test]
+    fn odd_and_empty_images_have_every_level() {
+        for (width, height) in [(1, 1), (3, 5), (7, 1), (1, 64), (640, 480)] {
+            let image = Image::from_rgb_f32("odd", width, height, vec![[2.0; 3]; (width * height) as usize]);
+            for footprint in [0.0, 0.1, 1.0, f32::NAN] {
+                let value = image.sample(&texture(Wrap::Repeat), vec2(0.9, 0.2), footprint);
+                assert!((value - Vec4::new(2.0, 2.0, 2.0, 1.0)).length() < 1e-5);
+            }
+        }
+        let empty = Image::from_rgba8("empty", 0, 9, Vec::new(), ColorSpace::Srgb);
+        assert_eq!(empty.sample(&texture(Wrap::Repeat), vec2(0.9, 0.2), 0.0), Vec4::ONE);
+    }
+
+    #[test]
+    fn strange_coordinates_read_something_finite() {
+        let image = checker(4);
+        for u in [f32::NAN, f32::INFINITY, -f32::INFINITY, 1e30, -1e9, f32::MIN_POSITIVE] {
+            for wrap in [Wrap::Repeat, Wrap::Mirror, Wrap::Clamp] {
+                let _ = image.sample(&texture(wrap), vec2(u, 0.1), 0.0);
+                let mut nearest = texture(wrap);
+                nearest.nearest = true;
+                assert!(image.sample(&nearest, vec2(u, 0.1), 0.0).is_finite());
+            }
+        }
     }
 }

@@ -1,0 +1,290 @@
+//! Finding what a ray meets: a two-level bounding volume hierarchy over instances.
+//!
+//! The lower level has one tree for every set of meshes that share a transform: the materials of one glTF mesh are one
+//! tree, and instances of it share the tree. The upper level is a tree over the placed ones, in *render space*: world
+//! axes, metres, single precision, relative to an origin near the eye, so that a scene far from the
+//! world's origin keeps its precision. Both levels are `obvhs`'s eight-wide compressed trees.
+//!
+//! Static scenes build their lower trees once; [`Accel::place`] then costs one small tree over the instances, and nothing
+//! at all when neither the origin nor an instance has moved.
+
+mod deform;
+mod displaced;
+mod intersect;
+mod opacity;
+mod tree;
+mod triangle;
+
+use crate::frame::SurfaceRef;
+use crate::scene::{Mesh, Pose, Scene};
+use deform::{Deformed, Shape, affine, is_deformable};
+pub use displaced::Displaced;
+use glam::{Affine3A, DAffine3, DVec3, Mat3A, Vec3, Vec3A, Vec4};
+pub use intersect::{RayHit, Sides};
+use obvhs::cwbvh::CwBvh;
+use rayon::prelude::*;
+use std::collections::HashMap;
+use tree::{Bounds, Tree, build_over};
+
+/// The scene as rays meet it. See the [module](self).
+pub struct Accel {
+    origin: DVec3,
+    /// Lower trees: shared ones first, then one for each group that is deformed.
+    trees: Vec<Tree>,
+    groups: Vec<Group>,
+    /// For each instance: its posed vertices, where it is deformed.
+    deformed: Vec<Option<Box<Deformed>>>,
+    /// For each instance: where it stands.
+    placements: Vec<Placement>,
+    /// What can be met, in the order of the upper tree.
+    placed: Vec<Placed>,
+    upper: CwBvh,
+    bounds: Bounds,
+    /// Length of the unit in which rays are parametrised inside the trees: a power of two, so that it costs no
+    /// precision. `obvhs` takes any box that a ray leaves before t = 1e-4 for behind it, which must be short.
+    unit: f32,
+}
+
+/// Instances that share a transform and a tree.
+struct Group {
+    tree: usize,
+    node: usize,
+    node_from_object: DAffine3,
+    /// Their numbers; all of one node.
+    instances: Vec<u32>,
+    /// Skinned or morphed: its tree is its own. Skinned vertices stand in render space already.
+    deformable: bool,
+}
+
+/// A group as the upper tree holds it.
+struct Placed {
+    group: usize,
+    object_from_render: Affine3A,
+}
+
+/// Where an instance stands in render space.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Placement {
+    pub render_from_object: Affine3A,
+    /// Inverse transposed; normals come out unnormalised.
+    pub normals: Mat3A,
+    /// -1 where the transform mirrors, so that triangles wind the other way; otherwise 1.
+    pub winding: f32,
+    /// Whether it can be met: visible and with a volume to stand in.
+    pub present: bool,
+}
+
+impl Default for Placement {
+    fn default() -> Self {
+        let render_from_object = Affine3A::IDENTITY;
+        Self { render_from_object, normals: Mat3A::IDENTITY, winding: 1.0, present: false }
+    }
+}
+
+impl Accel {
+    /// Builds the meshes' trees, in parallel, once for the scene. Nothing is met before [`Accel::place`].
+    pub fn new(scene: &Scene) -> Self {
+        let (groups, meshes) = group(scene);
+        let trees = meshes.par_iter().map(|meshes| {
+            Tree::new(scene, meshes.iter().map(|&m| (m, scene.meshes[m].positions.as_slice())))
+        });
+        Self {
+            origin: DVec3::ZERO,
+            trees: trees.collect(),
+            groups,
+            deformed: scene.instances.iter().map(|_| None).collect(),
+            placements: vec![Placement::default(); scene.instances.len()],
+            placed: Vec::new(),
+            upper: CwBvh::default(),
+            bounds: Bounds::default(),
+            unit: 1.0,
+        }
+    }
+
+    /// Places the instances as `pose` has them, relative to `origin`, and poses skinned and morphed meshes (their
+    /// trees are rebuilt where their shape has changed; those of static ones never).
+    ///
+    /// Instances that are hidden, or whose transform is singular, are not placed.
+    pub fn place(&mut self, scene: &Scene, pose: &Pose, origin: DVec3) {
+        self.origin = origin;
+        let deformed = self.deform(scene, pose);
+        let mut moved = deformed;
+        for group in &self.groups {
+            let placement = place_group(scene, group, pose, origin);
+            for &instance in &group.instances {
+                let old = &mut self.placements[instance as usize];
+                moved |= *old != placement;
+                *old = placement;
+            }
+        }
+        if moved {
+            self.build_upper();
+        }
+    }
+
+    /// Poses deformable instances and rebuilds the trees of those whose shape has changed. True if any has.
+    fn deform(&mut self, scene: &Scene, pose: &Pose) -> bool {
+        let mut changed = false;
+        for group in self.groups.iter().filter(|g| g.deformable) {
+            let mut stale = false;
+            for &i in &group.instances {
+                let instance = &scene.instances[i as usize];
+                let shape = Shape::of(scene, pose, instance, self.origin);
+                let old = &mut self.deformed[i as usize];
+                if old.as_ref().is_none_or(|d| d.shape != shape) {
+                    *old = Some(Box::new(Deformed::new(&scene.meshes[instance.mesh], shape)));
+                    stale = true;
+                }
+            }
+            if stale {
+                let parts = group.instances.iter().map(|&i| {
+                    let mesh = scene.instances[i as usize].mesh;
+                    let posed = self.deformed[i as usize].as_ref();
+                    (mesh, posed.map_or(scene.meshes[mesh].positions.as_slice(), |d| &d.positions))
+                });
+                self.trees[group.tree] = Tree::new(scene, parts);
+                changed = true;
+            }
+        }
+        changed
+    }
+
+    fn build_upper(&mut self) {
+        let mut bounds = Vec::new();
+        let mut placed = Vec::new();
+        for (number, group) in self.groups.iter().enumerate() {
+            let tree = &self.trees[group.tree];
+            let placement = group.instances.first().map(|&i| self.placements[i as usize]).unwrap_or_default();
+            if !placement.present || tree.bounds.is_empty() {
+                continue;
+            }
+            let mut bound = Bounds::default();
+            for corner in tree.bounds.corners() {
+                bound.include(placement.render_from_object.transform_point3(corner));
+            }
+            bounds.push(bound);
+            placed.push(Placed { group: number, object_from_render: placement.render_from_object.inverse() });
+        }
+        self.bounds = bounds.iter().fold(Bounds::default(), |mut all, b| {
+            all.include(b.min);
+            all.include(b.max);
+            all
+        });
+        self.upper = build_over(&bounds, &self.bounds);
+        let mut slots: Vec<Option<Placed>> = placed.into_iter().map(Some).collect();
+        self.placed = self.upper.primitive_indices.iter().filter_map(|&i| slots[i as usize].take()).collect();
+        let size = (self.bounds.max - self.bounds.min).max_element();
+        // A scene is 2^13 to 2^14 units across; the exponent alone, so a power of two.
+        let size = if size > 0.0 { size.clamp(1e-20, 1e20) } else { 1.0 };
+        self.unit = f32::from_bits(size.to_bits() & 0x7f80_0000) / 8192.0;
+    }
+
+    /// World position of render space's origin.
+    pub fn origin(&self) -> DVec3 {
+        self.origin
+    }
+
+    /// A point on a surface, deformed meshes considered, relative to the origin. For the background: zero.
+    pub fn surface_point(&self, scene: &Scene, surface: SurfaceRef) -> Vec3 {
+        let Some(instance) = scene.instances.get(surface.instance as usize) else { return Vec3::ZERO };
+        let index = surface.instance as usize;
+        let mesh = &scene.meshes[instance.mesh];
+        let positions = self.positions(index, mesh);
+        let Some(triangle) = mesh.triangles.get(surface.primitive as usize) else { return Vec3::ZERO };
+        let [a, b, c] = triangle.map(|i| Vec3A::from(positions[i as usize]));
+        self.placements[index].render_from_object.transform_point3a(interpolate(a, b, c, surface)).into()
+    }
+
+    /// The box around everything, relative to the origin; nothing where nothing is placed.
+    pub fn bounds(&self) -> Option<(Vec3, Vec3)> {
+        (!self.bounds.is_empty()).then_some((self.bounds.min, self.bounds.max))
+    }
+
+    /// Memory that the trees and posed vertices take.
+    pub fn memory_bytes(&self) -> u64 {
+        let trees: usize = self.trees.iter().map(Tree::memory_bytes).sum();
+        let deformed: usize = self.deformed.iter().flatten().map(|d| d.memory_bytes()).sum();
+        let upper = size_of_val(self.upper.nodes.as_slice()) + size_of_val(self.placed.as_slice());
+        (trees + deformed + upper) as u64
+    }
+
+    /// Where instance number `instance` stands.
+    pub(crate) fn placement(&self, instance: usize) -> &Placement {
+        &self.placements[instance]
+    }
+
+    /// Posed positions of an instance of `mesh`.
+    pub(crate) fn positions<'a>(&'a self, instance: usize, mesh: &'a Mesh) -> &'a [Vec3] {
+        self.deformed[instance].as_ref().map_or(&mesh.positions, |d| &d.positions)
+    }
+
+    /// Posed normals of an instance of `mesh`.
+    pub(crate) fn normals<'a>(&'a self, instance: usize, mesh: &'a Mesh) -> &'a [Vec3] {
+        self.deformed[instance].as_ref().map_or(&mesh.normals, |d| &d.normals)
+    }
+
+    /// Posed tangents of an instance of `mesh`.
+    pub(crate) fn tangents<'a>(&'a self, instance: usize, mesh: &'a Mesh) -> &'a [Vec4] {
+        self.deformed[instance].as_ref().map_or(&mesh.tangents, |d| &d.tangents)
+    }
+}
+
+/// The point of a triangle that has the barycentrics of `surface`. A weighted sum of all three corners: the same error
+/// everywhere on the triangle, and none at the corners.
+pub(crate) fn interpolate(a: Vec3A, b: Vec3A, c: Vec3A, surface: SurfaceRef) -> Vec3A {
+    let SurfaceRef { u, v, .. } = surface;
+    a * (1.0 - u - v) + b * u + c * v
+}
+
+/// Sorts instances into groups that share a transform, and finds the sets of meshes that need a tree.
+fn group(scene: &Scene) -> (Vec<Group>, Vec<Vec<usize>>) {
+    let mut groups: Vec<Group> = Vec::new();
+    let mut rigid: HashMap<(usize, [u64; 12]), usize> = HashMap::new();
+    for (i, instance) in scene.instances.iter().enumerate() {
+        let deformable = is_deformable(scene, instance);
+        let new = groups.len();
+        let key = (instance.node, instance.node_from_object.to_cols_array().map(f64::to_bits));
+        let number = if deformable { new } else { *rigid.entry(key).or_insert(new) };
+        if number == new {
+            let (node, node_from_object) = (instance.node, instance.node_from_object);
+            groups.push(Group { tree: 0, node, node_from_object, instances: Vec::new(), deformable });
+        }
+        groups[number].instances.push(i as u32);
+    }
+    let mut trees: Vec<Vec<usize>> = Vec::new();
+    let mut shared: HashMap<Vec<usize>, usize> = HashMap::new();
+    for group in &mut groups {
+        let meshes: Vec<usize> = group.instances.iter().map(|&i| scene.instances[i as usize].mesh).collect();
+        let new = trees.len();
+        // A deformable group's tree is built when it is posed.
+        let (tree, meshes) = if group.deformable {
+            (new, Vec::new())
+        } else {
+            (*shared.entry(meshes.clone()).or_insert(new), meshes)
+        };
+        if tree == new {
+            trees.push(meshes);
+        }
+        group.tree = tree;
+    }
+    (groups, trees)
+}
+
+fn place_group(scene: &Scene, group: &Group, pose: &Pose, origin: DVec3) -> Placement {
+    let visible = pose.visible.get(group.node).copied().unwrap_or(false);
+    let skinned = group.instances.first().is_some_and(|&i| scene.instances[i as usize].skin.is_some());
+    if skinned {
+        return Placement { present: visible, ..Placement::default() };
+    }
+    let mut m = pose.world_from_node[group.node] * group.node_from_object;
+    m.translation -= origin;
+    let render_from_object = affine(m);
+    let object_from_render = render_from_object.inverse();
+    let regular = render_from_object.is_finite() && object_from_render.is_finite();
+    Placement {
+        render_from_object,
+        normals: object_from_render.matrix3.transpose(),
+        winding: if m.matrix3.determinant() < 0.0 { -1.0 } else { 1.0 },
+        present: visible && regular,
+    }
+}

@@ -1,0 +1,276 @@
+//! Tracing as Whitted did: one ray through a pixel, one shadow ray to each light, mirrored and refracted rays on from
+//! there. `docs/shading.md` has the model, its formulas and its cut-offs.
+//!
+//! The work is split as the paper splits it. [`Tracer::cast`] finds what does not depend on the eye: the point, and the
+//! light that arrives there. [`Tracer::shade`] adds what does (the paper's *enhancement*): the texture under the
+//! pixel's beam, highlights, reflection, refraction. It is a function of the view, the sample and its shadow bits
+//! alone, whether the sample was just cast or carried over from another frame: so a still camera gives the same
+//! values frame after frame.
+
+mod ggx;
+mod interaction;
+mod light;
+mod surface;
+mod whitted;
+mod world;
+
+use crate::accel::{Accel, Sides};
+use crate::frame::{PackedNormal, RayCounts, SurfaceSample};
+use crate::scene::{Pose, Scene, View};
+use glam::Vec3;
+use interaction::{Beam, Side, SurfaceInteraction};
+use light::{Arriving, Emitter};
+use std::f32::consts::FRAC_1_PI;
+use surface::{Surface, occlusion};
+use whitted::Path;
+use world::Surroundings;
+
+/// Something this much nearer than a sample, as a share of its distance, hides it.
+const HIDING_SHARE: f32 = 1e-3;
+
+/// How deep to trace.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct TraceOptions {
+    /// Mirrored and refracted rays in a row, at most.
+    pub bounces: u32,
+}
+
+impl Default for TraceOptions {
+    fn default() -> Self {
+        Self { bounces: 4 }
+    }
+}
+
+/// What reaches the eye from a point, in W/m2/sr. The sum of the parts is the pixel's colour.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Radiance {
+    /// Scattered light of the lights and the world.
+    pub diffuse: Vec3,
+    /// Highlights, reflection, refraction, and what is seen through blended surfaces.
+    pub specular: Vec3,
+    /// Emission, unlit colour, and the background.
+    pub emission: Vec3,
+    /// Coverage: 1 on surfaces and background alike.
+    pub alpha: f32,
+}
+
+impl Radiance {
+    /// All parts together.
+    pub fn total(&self) -> Vec3 {
+        self.diffuse + self.specular + self.emission
+    }
+}
+
+/// Traces rays through a scene at one time. Shared by all threads.
+pub struct Tracer<'a> {
+    scene: &'a Scene,
+    accel: &'a Accel,
+    options: TraceOptions,
+    lights: Vec<Emitter>,
+    world: Surroundings<'a>,
+}
+
+/// The eye of a view in render space.
+#[derive(Clone, Copy)]
+struct Eye {
+    position: Vec3,
+    forward: Vec3,
+    perspective: bool,
+    /// Side of a pixel at planar depth 1, or anywhere for orthographic views.
+    pixel: f32,
+}
+
+impl Eye {
+    /// Unit direction from `point` to the eye, and the pixel's beam there.
+    fn seen_from(&self, point: Vec3) -> (Vec3, Beam) {
+        if !self.perspective {
+            return (-self.forward, Beam { width: self.pixel, spread: 0.0 });
+        }
+        let along = point - self.position;
+        let depth = along.dot(self.forward).abs();
+        (-along.normalize_or(self.forward), Beam { width: self.pixel * depth, spread: self.pixel })
+    }
+}
+
+impl<'a> Tracer<'a> {
+    /// A tracer of `scene` as `accel` has it placed, under the lights of `pose`.
+    pub fn new(scene: &'a Scene, accel: &'a Accel, pose: &'a Pose, options: TraceOptions) -> Self {
+        let lights = pose.lights.iter().map(|l| Emitter::new(l, accel.origin())).collect();
+        Self { scene, accel, options, lights, world: Surroundings::new(scene) }
+    }
+
+    /// Words of 32 shadow bits that a sample needs: one bit for each light.
+    pub fn lit_words(&self) -> usize {
+        self.lights.len().div_ceil(32)
+    }
+
+    /// Casts a ray from the eye through raster position (x, y), and from what it meets one to every light that could
+    /// shine there. Sets the bits in `lit` of those that do and clears all others.
+    ///
+    /// The ray starts at the view's near plane and ends at its far plane. Counts `primary` and `shadow`.
+    pub fn cast(&self, view: &View, x: f64, y: f64, lit: &mut [u32], rays: &mut RayCounts) -> SurfaceSample {
+        lit.fill(0);
+        rays.primary += 1;
+        let ray = view.ray(x, y);
+        let origin = (ray.origin - self.accel.origin()).as_vec3();
+        let direction = ray.direction.as_vec3();
+        let (near, far) = (view.lens.near.max(0.0) as f32, view.lens.far as f32);
+        let Some(hit) = self.accel.intersect(self.scene, origin, direction, near, far, Sides::Visible) else {
+            return SurfaceSample::background(direction.normalize_or(Vec3::NEG_Z));
+        };
+        let eye = self.eye(view);
+        // The beam at the point itself, as `shade` will have it.
+        let (toward, beam) = eye.seen_from(self.accel.surface_point(self.scene, hit.surface));
+        let it = SurfaceInteraction::new(
+            self.scene,
+            self.accel,
+            hit.surface,
+            Side::Front(hit.front),
+            toward,
+            beam,
+        );
+        let mut irradiance = Vec3::ZERO;
+        if !it.material.unlit {
+            irradiance = self.ambient(&it);
+            for (i, light) in self.lights.iter().enumerate() {
+                if let Some(arriving) = self.facing(&it, light) {
+                    rays.shadow += 1;
+                    if self.reaches(&it, &arriving) {
+                        irradiance += arriving.irradiance;
+                        lit[i / 32] |= 1 << (i % 32);
+                    }
+                }
+            }
+        }
+        SurfaceSample {
+            position: it.position,
+            surface: hit.surface,
+            object: self.scene.instances[hit.surface.instance as usize].object,
+            normal: PackedNormal::new(it.geometric),
+            irradiance: finite(irradiance),
+        }
+    }
+
+    /// What the eye sees of `sample`, whose shadow bits are `lit`: everything that depends on the eye is worked out
+    /// anew, for cast and reused samples alike. Counts `reflection` and `refraction`.
+    pub fn shade(&self, view: &View, sample: &SurfaceSample, lit: &[u32], rays: &mut RayCounts) -> Radiance {
+        let eye = self.eye(view);
+        if sample.surface.is_background() {
+            let emission =
+                finite(self.world.radiance(sample.position, eye.pixel * f32::from(eye.perspective)));
+            return Radiance { emission, alpha: 1.0, ..Radiance::default() };
+        }
+        let (toward, beam) = eye.seen_from(sample.position);
+        let it = self.interaction(sample, toward, beam);
+        let surface = Surface::new(&it);
+        let mut highlights = Vec3::ZERO;
+        for (i, light) in self.lights.iter().enumerate() {
+            if is_lit(lit, i)
+                && let Some(arriving) = self.facing(&it, light)
+            {
+                highlights += surface.highlight(&it, toward, &arriving);
+            }
+        }
+        let path = Path::new(beam);
+        let seen = self.leaving(&it, &surface, toward, sample.irradiance, highlights, &path, rays);
+        Radiance {
+            diffuse: finite(seen.diffuse),
+            specular: finite(seen.specular),
+            emission: finite(seen.emission),
+            alpha: 1.0,
+        }
+    }
+
+    /// Unit shading normal of a sample, normal map applied, turned to the side from which it was seen. Zero for
+    /// the background.
+    pub fn shading_normal(&self, view: &View, sample: &SurfaceSample) -> Vec3 {
+        if sample.surface.is_background() {
+            return Vec3::ZERO;
+        }
+        let (toward, beam) = self.eye(view).seen_from(sample.position);
+        self.interaction(sample, toward, beam).normal
+    }
+
+    /// The share of a sample's diffuse radiance that light number `light` brings, if its bit in `lit` is set.
+    pub fn light_diffuse(&self, view: &View, sample: &SurfaceSample, lit: &[u32], light: usize) -> Vec3 {
+        if sample.surface.is_background() || !is_lit(lit, light) {
+            return Vec3::ZERO;
+        }
+        let (toward, beam) = self.eye(view).seen_from(sample.position);
+        let it = self.interaction(sample, toward, beam);
+        let Some(arriving) = self.lights.get(light).and_then(|l| self.facing(&it, l)) else {
+            return Vec3::ZERO;
+        };
+        let surface = Surface::new(&it);
+        finite(surface.albedo * arriving.irradiance * FRAC_1_PI * surface.coverage)
+    }
+
+    /// True if something stands between the eye and a sample, nearer by more than a thousandth of its distance; for
+    /// the background, if anything stands there at all. The ray is not counted.
+    ///
+    /// An orthographic background sample does not say where it is, and is never found hidden.
+    pub fn is_hidden(&self, view: &View, sample: &SurfaceSample) -> bool {
+        let eye = self.eye(view);
+        let (near, far) = (view.lens.near.max(0.0) as f32, view.lens.far as f32);
+        let (origin, along, until) = match (eye.perspective, sample.surface.is_background()) {
+            (true, true) => (eye.position, sample.position, f32::INFINITY),
+            (true, false) => (eye.position, sample.position - eye.position, 1.0 - HIDING_SHARE),
+            (false, true) => return false,
+            (false, false) => {
+                let depth = (sample.position - eye.position).dot(eye.forward);
+                (sample.position - eye.forward * depth, eye.forward * depth, 1.0 - HIDING_SHARE)
+            }
+        };
+        // Planar depth to a length of `along`.
+        let planar = along.dot(eye.forward);
+        let (t_min, t_max) = (near / planar, (far / planar).min(until));
+        planar > 0.0
+            && self.accel.intersect(self.scene, origin, along, t_min, t_max, Sides::Visible).is_some()
+    }
+
+    fn eye(&self, view: &View) -> Eye {
+        Eye {
+            position: (view.eye - self.accel.origin()).as_vec3(),
+            forward: view.forward.as_vec3(),
+            perspective: view.is_perspective(),
+            pixel: view.pixel_size() as f32,
+        }
+    }
+
+    fn interaction(&self, sample: &SurfaceSample, toward: Vec3, beam: Beam) -> SurfaceInteraction<'a> {
+        let side = Side::Towards(sample.normal.get());
+        SurfaceInteraction::new(self.scene, self.accel, sample.surface, side, toward, beam)
+    }
+
+    /// What arrives from a light that is in front of the surface, Lambert's cosine included.
+    fn facing(&self, it: &SurfaceInteraction, light: &Emitter) -> Option<Arriving> {
+        let mut arriving = light.arriving(it.position)?;
+        let cos = it.normal.dot(arriving.to_light);
+        if cos <= 0.0 || it.geometric.dot(arriving.to_light) <= 0.0 {
+            return None;
+        }
+        arriving.irradiance *= cos;
+        Some(arriving)
+    }
+
+    /// Whether nothing stands in the light's way. Stops a little before the light, which may itself stand on a surface.
+    fn reaches(&self, it: &SurfaceInteraction, arriving: &Arriving) -> bool {
+        let from = it.start(arriving.to_light);
+        self.accel.unoccluded(self.scene, from, arriving.to_light, arriving.distance * (1.0 - 1e-4))
+    }
+
+    /// Irradiance from the world.
+    fn ambient(&self, it: &SurfaceInteraction) -> Vec3 {
+        if self.world.is_black() { Vec3::ZERO } else { self.world.irradiance(it.normal) * occlusion(it) }
+    }
+}
+
+fn is_lit(lit: &[u32], light: usize) -> bool {
+    lit.get(light / 32).is_some_and(|word| word >> (light % 32) & 1 != 0)
+}
+
+/// `light`, or nothing where arithmetic on extreme input has overflowed: one such pixel would spoil every filter
+/// after us.
+fn finite(light: Vec3) -> Vec3 {
+    if light.is_finite() { light } else { Vec3::ZERO }
+}

@@ -1,0 +1,188 @@
+//! What depends on the eye: sides, clipping, highlights, mirrors.
+
+use crate::rig::*;
+use buzz::scene::{LightKind, Material, Mesh, Projection, Scene};
+use glam::{DAffine3, DQuat, DVec3, Vec3};
+use std::f32::consts::PI;
+
+#[test]
+fn back_faces_are_seen_only_where_double_sided() {
+    for (double_sided, seen) in [(false, false), (true, true)] {
+        let mut scene = floor(Material { double_sided, ..matt(Vec3::ONE) });
+        scene.cameras.clear();
+        scene.add_camera(DVec3::new(0.0, -4.0, 0.0), DVec3::ZERO, 0.8);
+        let pixel = Rig::new(scene).center();
+        assert_eq!(!pixel.sample.surface.is_background(), seen);
+        assert!(!seen || pixel.sample.normal.get() == Vec3::NEG_Y);
+    }
+}
+
+#[test]
+fn a_mirrored_instance_keeps_its_front() {
+    for scale in [DVec3::new(-1.0, 1.0, 1.0), DVec3::new(1.0, 1.0, -3.0), DVec3::new(-2.0, 0.5, -1.0)] {
+        let mut scene = Scene::default();
+        add_plane(&mut scene, matt(Vec3::ONE), 10.0, DAffine3::from_scale(scale));
+        scene.add_camera(DVec3::new(0.0, 4.0, 0.0), DVec3::ZERO, 0.8);
+        add_sun(&mut scene);
+        let pixel = Rig::new(scene).center();
+        assert_eq!((pixel.sample.normal.get(), pixel.lit), (Vec3::Y, vec![1]), "{scale}");
+    }
+}
+
+#[test]
+fn nothing_is_seen_before_the_near_plane_or_behind_the_far_one() {
+    let mut scene = floor(matt(Vec3::ONE));
+    add_plane(&mut scene, matt(Vec3::ONE), 1.0, at(0.0, 3.0, 0.0));
+    let object = |near: f64, far: f64| {
+        let mut scene = scene.clone();
+        (scene.cameras[0].lens.near, scene.cameras[0].lens.far) = (near, far);
+        Rig::new(scene).center().sample.object
+    };
+    assert_eq!((object(0.0, f64::INFINITY), object(1.01, 1e6), object(1.01, 3.99)), (2, 1, 0));
+}
+
+#[test]
+fn an_orthographic_pixel_looks_straight_ahead() {
+    let mut scene = floor(matt(Vec3::ONE));
+    scene.cameras[0].lens.projection = Projection::Orthographic { xmag: 2.0, ymag: 2.0 };
+    let rig = Rig::new(scene);
+    let sample = rig.pixel(65.0, 0.0).sample;
+    assert!(sample.position.abs().distance(Vec3::new(2.0, 0.0, 2.0)) < 1e-5);
+    assert!(!rig.tracer().is_hidden(&rig.view(), &sample));
+}
+
+#[test]
+fn unlit_surfaces_show_their_base_colour_and_cast_no_shadow_rays() {
+    let color = Vec3::new(0.2, 0.4, 0.6);
+    let mut scene = floor(Material { unlit: true, ..Material::dielectric(color, 0.0) });
+    add_sun(&mut scene);
+    scene.world.color = Vec3::ONE;
+    let pixel = Rig::new(scene).center();
+    assert_eq!((pixel.radiance.emission, pixel.radiance.total()), (color, color));
+    assert_eq!(pixel.rays.total(), 1);
+}
+
+#[test]
+fn a_highlight_is_gltfs_brdf() {
+    // Light, eye and normal in one line: every cosine is 1, and the Fresnel term is F0.
+    let roughness = 0.5f32;
+    let mut scene = floor(Material { metallic: 0.0, ..Material::dielectric(Vec3::ONE, roughness) });
+    scene.add_light(LightKind::Point, 8.0, at(0.0, 2.0, 0.0));
+    let pixel = Rig::new(scene).center();
+    let alpha2 = roughness.powi(4);
+    let (density, visibility) = (1.0 / (PI * alpha2), 0.25);
+    let expected = Vec3::splat(8.0 / 4.0 * density * visibility * 0.04);
+    assert!(close(pixel.radiance.specular, expected), "{:?} {expected}", pixel.radiance);
+}
+
+#[test]
+fn a_shadow_takes_the_highlight_too() {
+    let mut scene = floor(Material::dielectric(Vec3::ONE, 0.4));
+    add_plane(&mut scene, matt(Vec3::ONE), 1.0, at(0.0, 6.0, 0.0));
+    add_sun(&mut scene);
+    let pixel = Rig::new(scene).center();
+    assert_eq!((pixel.lit, pixel.radiance.total()), (vec![0], Vec3::ZERO));
+}
+
+/// A mirror in the floor that shows the camera something glowing behind the horizon, at 45 degrees.
+fn mirror_scene(material: Material) -> Scene {
+    let mut scene = floor(material);
+    let facing = DAffine3::from_rotation_translation(
+        DQuat::from_rotation_z(std::f64::consts::FRAC_PI_2),
+        DVec3::new(8.0, 8.0, 0.0),
+    );
+    add_plane(&mut scene, glowing(Vec3::new(1.0, 2.0, 3.0)), 4.0, facing);
+    scene.cameras.clear();
+    scene.add_camera(DVec3::new(-4.0, 4.0, 0.0), DVec3::ZERO, 0.8);
+    scene
+}
+
+#[test]
+fn a_mirror_shows_what_it_faces_by_schlicks_weight() {
+    let color = Vec3::new(0.9, 0.5, 0.1);
+    let metal = Material { base_color: color.extend(1.0), ..mirror() };
+    let pixel = Rig::new(mirror_scene(metal)).center();
+    let grazing = (1.0 - 0.5f32.sqrt()).powi(5);
+    let weight = color + (Vec3::ONE - color) * grazing;
+    assert!(close(pixel.radiance.specular, weight * Vec3::new(1.0, 2.0, 3.0)), "{:?}", pixel.radiance);
+    assert_eq!((pixel.rays.reflection, pixel.rays.refraction), (1, 0));
+
+    let dielectric = Rig::new(mirror_scene(Material::dielectric(Vec3::ONE, 0.0))).center();
+    let weight = 0.04 + 0.96 * grazing;
+    assert!(close(dielectric.radiance.specular, weight * Vec3::new(1.0, 2.0, 3.0)));
+}
+
+#[test]
+fn a_mirror_fades_with_roughness_and_casts_no_ray_where_it_shows_nothing() {
+    let shown = |roughness: f32| {
+        let pixel = Rig::new(mirror_scene(Material { roughness, ..mirror() })).center();
+        (pixel.radiance.specular.x, pixel.rays.reflection)
+    };
+    let values: Vec<f32> = (0..=30).map(|i| shown(i as f32 * 0.01).0).collect();
+    assert!(values.is_sorted_by(|a, b| a >= b), "{values:?}");
+    assert!(values[0] > 0.99 && values[10] > 0.99 && values[20] > 0.4 && values[20] < 0.6);
+    assert_eq!((shown(0.3), shown(1.0)), ((0.0, 0), (0.0, 0)));
+    assert_eq!(shown(0.299).1, 0, "less than 1/256 is not worth a ray");
+}
+
+#[test]
+fn shadow_rays_of_reflected_points_count_as_reflection() {
+    let mut scene = mirror_scene(mirror());
+    scene.materials[1] = matt(Vec3::ONE);
+    scene.add_light(LightKind::Point, 100.0, at(0.0, 8.0, 0.0));
+    let pixel = Rig::new(scene).center();
+    assert_eq!((pixel.rays.primary, pixel.rays.shadow, pixel.rays.reflection), (1, 1, 2));
+    assert!(pixel.radiance.specular.x > 0.1);
+}
+
+#[test]
+fn two_mirrors_reflect_as_often_as_allowed() {
+    let mut scene = floor(mirror());
+    scene.materials[0].emissive = Vec3::ONE;
+    add_plane(&mut scene, mirror(), 10.0, upside_down(8.0));
+    for bounces in 0..6 {
+        let mut rig = Rig::new(scene.clone());
+        rig.bounces = bounces;
+        let pixel = rig.center();
+        assert_eq!(pixel.rays.reflection, u64::from(bounces));
+        assert!(close(pixel.radiance.total(), Vec3::splat(1.0 + (bounces / 2) as f32)));
+    }
+}
+
+#[test]
+fn a_rough_metal_shows_the_world_blurred() {
+    let mut scene = floor(Material::default());
+    scene.world.color = Vec3::ONE;
+    let pixel = Rig::new(scene).center();
+    assert_eq!(pixel.rays.reflection, 0);
+    // A white metal that lost nothing would show 1; single scattering at full roughness loses half.
+    assert!(pixel.radiance.specular.x > 0.4 && pixel.radiance.specular.x <= 1.0, "{:?}", pixel.radiance);
+}
+
+#[test]
+fn the_eye_alone_decides_what_hides_a_sample() {
+    let mut scene = floor(matt(Vec3::ONE));
+    let rig = Rig::new(scene.clone());
+    let seen = rig.center().sample;
+    let sky = Rig::new(Scene { instances: Vec::new(), ..scene.clone() }).center().sample;
+    assert!(!rig.tracer().is_hidden(&rig.view(), &seen));
+    assert!(rig.tracer().is_hidden(&rig.view(), &sky));
+    add_plane(&mut scene, matt(Vec3::ONE), 1.0, at(0.0, 2.0, 0.0));
+    let covered = Rig::new(scene);
+    assert!(covered.tracer().is_hidden(&covered.view(), &seen));
+}
+
+#[test]
+fn a_sphere_is_round() {
+    let mut scene = Scene::default();
+    let material = scene.add_material(matt(Vec3::ONE));
+    let mesh = scene.add_mesh(Mesh::uv_sphere(1.0, 64, material));
+    scene.add_instance(mesh, DAffine3::IDENTITY);
+    scene.add_camera(DVec3::new(0.0, 0.0, 5.0), DVec3::ZERO, 0.5);
+    let rig = Rig::new(scene);
+    let sample = rig.pixel(40.0, 20.0).sample;
+    let normal = rig.tracer().shading_normal(&rig.view(), &sample);
+    assert!((sample.position.length() - 1.0).abs() < 2e-3);
+    assert!(normal.angle_between(sample.position) < 2e-3);
+    assert!(sample.normal.get().angle_between(sample.position) < 0.05);
+}
