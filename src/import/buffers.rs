@@ -2,17 +2,18 @@
 
 use super::{
     budget::Budget,
-    document::{Document, Element},
-    meshopt, uri,
+    document::{Document, Element, read_file},
+    meshopt,
+    uri::{self, Source},
 };
 use crate::Result;
-use std::cell::OnceCell;
+use std::{cell::OnceCell, collections::HashMap, path::PathBuf, rc::Rc};
 
 /// The binary data of a document.
 pub(super) struct Buffers<'a> {
     document: &'a Document,
-    /// None: the fallback of compressed views, which need not be there.
-    data: Vec<Option<Vec<u8>>>,
+    /// Bytes and how many of them count. None: the fallback of compressed views, which need not be there.
+    data: Vec<Option<(Rc<Vec<u8>>, usize)>>,
     decompressed: Vec<OnceCell<Vec<u8>>>,
     /// What the views and arrays made of the data may take.
     pub budget: Budget,
@@ -32,13 +33,13 @@ impl<'a> Buffers<'a> {
     pub fn load(document: &'a Document) -> Result<Self> {
         let mut data = Vec::new();
         let mut total = document.bytes;
+        // A file is read once, however many buffers name it.
+        let mut files: HashMap<PathBuf, Rc<Vec<u8>>> = HashMap::new();
         for (i, buffer) in document.elements("buffers")?.iter().enumerate() {
-            let bytes = load(document, buffer, i)?;
-            // The binary chunk is counted with the file already.
-            if buffer.get("uri").is_some() {
-                total = total.saturating_add(bytes.as_ref().map_or(0, Vec::len));
-            }
-            data.push(bytes);
+            data.push(load(document, buffer, i, &mut files)?);
+        }
+        for bytes in files.values() {
+            total = total.saturating_add(bytes.len());
         }
         let decompressed = (0..document.count("bufferViews")).map(|_| OnceCell::new()).collect();
         Ok(Self { document, data, decompressed, budget: Budget::new(total) })
@@ -77,7 +78,9 @@ impl<'a> Buffers<'a> {
             element
                 .error(format!("refers to /buffers/{buffer}, but there are {count}; export the file again"))
         })?;
-        let data = data.as_ref().ok_or_else(|| element.error(format!("/buffers/{buffer} has no data")))?;
+        let (data, counting) =
+            data.as_ref().ok_or_else(|| element.error(format!("/buffers/{buffer} has no data")))?;
+        let data = &data[..*counting];
         offset.checked_add(length).and_then(|end| data.get(offset..end)).ok_or_else(|| {
             element.error(format!(
                 "bytes {offset} to {offset}+{length} are outside /buffers/{buffer} of {} bytes; export the file again",
@@ -116,10 +119,25 @@ impl<'a> Buffers<'a> {
     }
 }
 
-fn load(document: &Document, buffer: &Element, index: usize) -> Result<Option<Vec<u8>>> {
+fn load(
+    document: &Document,
+    buffer: &Element,
+    index: usize,
+    files: &mut HashMap<PathBuf, Rc<Vec<u8>>>,
+) -> Result<Option<(Rc<Vec<u8>>, usize)>> {
     let length = buffer.required_index("byteLength")?;
-    let mut bytes = match (buffer.text("uri")?, &document.binary) {
-        (Some(text), _) => uri::resolve(document, text, &buffer.place)?.read(document, &buffer.place)?,
+    let bytes = match (buffer.text("uri")?, &document.binary) {
+        (Some(text), _) => match uri::resolve(document, text, &buffer.place)? {
+            Source::File(path) => match files.get(&path) {
+                Some(bytes) => bytes.clone(),
+                None => {
+                    let bytes = Rc::new(read_file(&path)?);
+                    files.insert(path, bytes.clone());
+                    bytes
+                }
+            },
+            other => Rc::new(other.read(document, &buffer.place)?),
+        },
         (None, Some(binary)) if index == 0 => binary.clone(),
         // note: not only with the extension's `fallback: true`; validators allow a buffer without data, and it
         // is an error only once something reads it.
@@ -130,6 +148,5 @@ fn load(document: &Document, buffer: &Element, index: usize) -> Result<Option<Ve
         return Err(buffer
             .error(format!("{length} bytes are wanted, but there are {found}; copy or export it again")));
     }
-    bytes.truncate(length);
-    Ok(Some(bytes))
+    Ok(Some((bytes, length)))
 }

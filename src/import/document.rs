@@ -11,6 +11,7 @@ use serde_json::{Map, Value};
 use std::{
     fs,
     path::{Path, PathBuf},
+    rc::Rc,
 };
 
 /// A parsed file.
@@ -22,7 +23,7 @@ pub(super) struct Document {
     /// The whole tree.
     root: Value,
     /// The GLB's binary chunk.
-    pub binary: Option<Vec<u8>>,
+    pub binary: Option<Rc<Vec<u8>>>,
     /// Size of the file.
     pub bytes: usize,
 }
@@ -51,7 +52,7 @@ impl Document {
             let place = format!("line {} column {}", e.line(), e.column());
             Error::input(file, place, format!("not valid JSON ({e}); is this a glTF file?"))
         })?;
-        let binary = binary.map(<[u8]>::to_vec);
+        let binary = binary.map(|bytes| Rc::new(bytes.to_vec()));
         let document = Self { file: file.to_owned(), folder, root, binary, bytes: size };
         document.check_version()?;
         Ok(document)

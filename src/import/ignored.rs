@@ -2,7 +2,11 @@
 
 use super::document::{Document, Element};
 use crate::{Error, Result, scene::Ignored};
-use std::{cell::RefCell, collections::HashSet, path::Path};
+use std::{
+    cell::RefCell,
+    collections::{HashMap, HashSet},
+    path::Path,
+};
 
 /// Extensions that are read. Everything else in `extensionsRequired` is refused.
 const READ: &[&str] = &[
@@ -13,6 +17,7 @@ const READ: &[&str] = &[
     "KHR_lights_punctual",
     "KHR_materials_emissive_strength",
     "KHR_materials_ior",
+    "KHR_materials_pbrSpecularGlossiness",
     "KHR_materials_specular",
     "KHR_materials_transmission",
     "KHR_materials_unlit",
@@ -37,7 +42,6 @@ const NOT_RENDERED: &[(&str, &str)] = &[
     ("KHR_materials_dispersion", "all colours refract alike"),
     ("KHR_materials_diffuse_transmission", "no light shines through"),
     ("KHR_materials_volume_scatter", "the inside is clear"),
-    ("KHR_materials_pbrSpecularGlossiness", "the metallic-roughness values beside it are used"),
     ("KHR_materials_variants", "the default materials are used"),
     ("KHR_draco_mesh_compression", "the uncompressed data beside it is used"),
     ("KHR_texture_basisu", "the PNG or JPEG beside it is used, if there is one"),
@@ -90,6 +94,7 @@ pub(super) fn check_extensions(document: &Document, notes: &Notes) -> Result<()>
             return Err(item.error(format!("the file requires {name}, which is not supported; {advice}")));
         }
     }
+    let mut places = first_uses(document)?;
     for item in document.root().items("extensionsUsed")? {
         let Some(name) = item.value.as_str() else { continue };
         if READ.contains(&name) {
@@ -97,20 +102,26 @@ pub(super) fn check_extensions(document: &Document, notes: &Notes) -> Result<()>
         }
         let known = NOT_RENDERED.iter().find(|(known, _)| *known == name);
         let effect = known.map_or("unknown; left out", |(_, effect)| effect);
-        notes.add(name, first_use(document, name).unwrap_or(item.place), effect);
+        notes.add(name, places.remove(name).unwrap_or(item.place), effect);
     }
     Ok(())
 }
 
-/// Where an extension is first used: the pointer that helps to find it in the authoring tool.
-fn first_use(document: &Document, name: &str) -> Option<String> {
+/// Where each extension is first used: the pointer that helps to find it in the authoring tool.
+fn first_uses(document: &Document) -> Result<HashMap<&str, String>> {
+    let mut places = HashMap::new();
     for array in ["materials", "nodes", "textures", "images", "cameras"] {
-        let found = |e: &Element| e.extension(name).is_some();
-        if let Some(element) = document.elements(array).ok()?.into_iter().find(found) {
-            return Some(element.place);
+        for element in document.elements(array)? {
+            let Some(extensions) = element.get("extensions") else { continue };
+            for (name, _) in extensions.members() {
+                places.entry(name).or_insert_with(|| element.place.clone());
+            }
         }
     }
-    document.root().extension(name).map(|e| e.place)
+    for (name, element) in document.root().get("extensions").iter().flat_map(Element::members) {
+        places.entry(name).or_insert(element.place);
+    }
+    Ok(places)
 }
 
 /// With `--strict`, anything left out is an error.

@@ -21,7 +21,14 @@ const SLOTS: &[(&[&str], ColorSpace)] = &[
     (&["extensions", "KHR_materials_specular", "specularTexture"], ColorSpace::Linear),
     (&["extensions", "KHR_materials_specular", "specularColorTexture"], ColorSpace::Srgb),
     (&["extensions", "KHR_materials_transmission", "transmissionTexture"], ColorSpace::Linear),
+    (&["extensions", SPECULAR_GLOSSINESS, "diffuseTexture"], ColorSpace::Srgb),
+    (&["extensions", SPECULAR_GLOSSINESS, "specularGlossinessTexture"], ColorSpace::Srgb),
 ];
+
+/// The older of the two material models; archived, and still met.
+const SPECULAR_GLOSSINESS: &str = "KHR_materials_pbrSpecularGlossiness";
+/// Reflectance at normal incidence of the default index of refraction.
+const F0: f32 = 0.04;
 
 /// The images that a material of the file uses.
 pub(super) fn wanted_images(material: &Element, notes: &Notes) -> Result<Vec<(usize, ColorSpace)>> {
@@ -111,6 +118,19 @@ pub(super) fn read(element: &Element, images: &Images, notes: &Notes) -> Result<
     }
     if let Some(extension) = element.extension("KHR_materials_volume") {
         out.volume = volume(&extension)?;
+    }
+    if let Some(extension) = element.extension(SPECULAR_GLOSSINESS) {
+        // The same reflectance as a dielectric with a coloured specular; only the glossiness texture has no place.
+        out.base_color = Vec4::from(extension.f32s("diffuseFactor", [1.0; 4])?).max(Vec4::ZERO);
+        out.base_color_texture = texture(&extension, "diffuseTexture", ColorSpace::Srgb)?;
+        (out.metallic, out.metallic_roughness_texture) = (0.0, None);
+        out.roughness = 1.0 - extension.f32("glossinessFactor", 1.0)?.clamp(0.0, 1.0);
+        out.specular_color =
+            Vec3::from(extension.f32s("specularFactor", [1.0; 3])?).clamp(Vec3::ZERO, Vec3::ONE) / F0;
+        out.specular_color_texture = texture(&extension, "specularGlossinessTexture", ColorSpace::Srgb)?;
+        if extension.get("specularGlossinessTexture").is_some() {
+            notes.add(SPECULAR_GLOSSINESS, element.place.clone(), "glossiness in textures is left out");
+        }
     }
     Ok(out)
 }

@@ -1,7 +1,7 @@
 //! Reads glTF 2.0 and OBJ files into a [`Scene`].
 //!
-//! What is read, what is left out (and listed in [`Scene::ignored`]) and what is refused is said in `docs/limits.md`;
-//! the lists themselves are in `ignored`. Three rules hold for every file, however broken:
+//! What is read, what is left out (and listed in [`Scene::ignored`]) and what is refused is said in `docs/scene.md`;
+//! the list of extensions is in `ignored`. Three rules hold for every file, however broken:
 //!
 //! - it never panics or hangs, and no file outside its own folder is read;
 //! - it takes no more memory than a multiple of its size (see `budget`);

@@ -23,6 +23,7 @@ use std::{
 pub(super) fn add(file: &Path, scene: &mut Scene) -> Result<()> {
     let bytes = read_file(file)?;
     let folder = uri::folder_of(file)?;
+    check_faces(file, &bytes)?;
     let missing = RefCell::new(Vec::new());
     let options =
         tobj::LoadOptions { single_index: true, triangulate: true, ignore_points: true, ignore_lines: true };
@@ -32,7 +33,7 @@ pub(super) fn add(file: &Path, scene: &mut Scene) -> Result<()> {
             _ => None,
         };
         match library {
-            Some(library) => tobj::load_mtl_buf(&mut library.as_slice()),
+            Some(library) => tobj::load_mtl_buf(&mut whole_colors(&library).as_bytes()),
             None => {
                 missing.borrow_mut().push(path.to_path_buf());
                 Ok(Default::default())
@@ -93,6 +94,53 @@ pub(super) fn add(file: &Path, scene: &mut Scene) -> Result<()> {
     Ok(())
 }
 
+/// Refuses faces whose indices cannot be, by line. `tobj` names no line, and computes with such indices unchecked.
+fn check_faces(file: &Path, bytes: &[u8]) -> Result<()> {
+    let mut counts = [0_i64; 3];
+    for (number, line) in bytes.split(|&b| b == b'\n').enumerate() {
+        let line = String::from_utf8_lossy(line);
+        let mut words = line.split_whitespace();
+        match words.next() {
+            Some("v") => counts[0] += 1,
+            Some("vt") => counts[1] += 1,
+            Some("vn") => counts[2] += 1,
+            Some("f" | "l" | "p") => {
+                for (part, count) in words.flat_map(|word| word.split('/').zip(counts)) {
+                    // Positive indices may name what comes later, negative ones count back from here.
+                    let index: i64 = if part.is_empty() { continue } else { part.parse().unwrap_or(0) };
+                    if index == 0 || index < -count || index > i64::from(u32::MAX) {
+                        let message =
+                            format!("`{part}` is no vertex: {count} stand before it; export the file again");
+                        return Err(Error::input(file, format!("line {}", number + 1), message));
+                    }
+                }
+            }
+            _ => {}
+        }
+    }
+    Ok(())
+}
+
+/// An MTL file whose colours all have three numbers: `Kd 0.5` is short for three times 0.5 and legal, but `tobj`
+/// panics on it. Colours in other forms (`spectral`, `xyz`) are left out.
+fn whole_colors(library: &[u8]) -> String {
+    let text = String::from_utf8_lossy(library);
+    let mut out = String::with_capacity(text.len());
+    for line in text.lines() {
+        let mut words = line.split_whitespace();
+        if let Some(key @ ("Ka" | "Kd" | "Ks" | "Ke")) = words.next() {
+            let numbers: Vec<f32> = words.map_while(|w| w.parse().ok()).collect();
+            let Some(&red) = numbers.first() else { continue };
+            let part = |i: usize| numbers.get(i).copied().unwrap_or(red);
+            out.push_str(&format!("{key} {red} {} {}", part(1), part(2)));
+        } else {
+            out.push_str(line);
+        }
+        out.push('\n');
+    }
+    out
+}
+
 fn note(scene: &mut Scene, file: &Path, feature: String, effect: &str) {
     let entry = Ignored { feature, place: file.display().to_string(), effect: effect.into() };
     if !scene.ignored.contains(&entry) {
@@ -129,9 +177,13 @@ fn mesh(model: tobj::Model, material: usize, textured: bool) -> Option<Mesh> {
         // v grows upwards in OBJ.
         let uv =
             |t: &[f32; 2]| Vec2::from_array([t[0], 1.0 - t[1]].map(|v| if v.is_finite() { v } else { 0.0 }));
-        let mut uvs: Vec<Vec2> = texcoords.as_chunks().0.iter().map(uv).collect();
-        uvs.resize(count, Vec2::ZERO);
-        mesh.uvs.push(uvs);
+        // If only some corners have them, `tobj` does not say which.
+        let whole = texcoords.len() == count * 2;
+        mesh.uvs.push(if whole {
+            texcoords.as_chunks().0.iter().map(uv).collect()
+        } else {
+            vec![Vec2::ZERO; count]
+        });
     }
     Some(mesh)
 }
