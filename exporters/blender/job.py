@@ -235,7 +235,7 @@ class _Export:
 
 def _dark(surround: dict | None) -> bool:
     """Whether a world sheds no light (an animated one may later)."""
-    return surround is None or "image" not in surround and (surround["strength"] == 0 or not any(surround["color"]))
+    return surround is None or ("image" not in surround and (surround["strength"] == 0 or not any(surround["color"])))
 
 
 def _choose_scene(name: str | None) -> bpy.types.Scene:

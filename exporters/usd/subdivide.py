@@ -1,8 +1,8 @@
 """Catmull-Clark subdivision with semi-sharp creases and corners, as UsdGeomMesh asks for it.
 
 The rules are those of DeRose, Kass, Truong, "Subdivision Surfaces in Character Animation" (1998), with OpenSubdiv's
-boundary rule `edgeAndCorner` (USD's default) or `edgeOnly`, and uniform creasing (sharpness falls by one a level;
-10 and more stays sharp for ever). Face-varying values are interpolated linearly within each face.
+boundary rule `edgeAndCorner` (USD's default) or `edgeOnly`, its blending of fractional sharpness, and uniform creasing
+(sharpness falls by one a level; 10 and more stays sharp for ever). Face-varying values are interpolated linearly within each face.
 """
 
 from __future__ import annotations
@@ -57,31 +57,34 @@ def catmull_clark(mesh: Polygons, corners_sharp: bool = True) -> Polygons:
 
     valence = np.bincount(edges.reshape(-1), minlength=n)
     face_count = np.bincount(corners, minlength=n)
-    is_sharp = sharp > 0
-    creases = np.bincount(edges[is_sharp].reshape(-1), minlength=n)
-    sharp_sum = _sum(np.repeat(sharp[is_sharp], 2), edges[is_sharp].reshape(-1), n)
-    own = mesh.point_sharpness if mesh.point_sharpness is not None else np.zeros(n)
-    corner = (creases > 2) | (own > 0)
+    own = mesh.point_sharpness.copy() if mesh.point_sharpness is not None else np.zeros(n)
     if corners_sharp:
-        corner |= (face_count == 1) & (creases == 2)
-    boundary = np.bincount(edges[uses != 2].reshape(-1), minlength=n) > 0
+        own[(face_count == 1) & (np.bincount(edges[uses != 2].reshape(-1), minlength=n) == 2)] = INFINITE
+    later, own_later = _next(sharp), _next(own)
+    # Where a point's rule changes with the coming level, both rules are blended by how sharp what smooths out was.
+    fading = sharp * (later <= 0)
+    count = np.bincount(edges[fading > 0].reshape(-1), minlength=n) + ((own > 0) & (own_later <= 0))
+    total = _sum(np.repeat(fading, 2), edges.reshape(-1), n)[:, 0] + own * (own_later <= 0)
+    share = np.clip(total / np.maximum(count, 1), 0, 1)[:, None]
 
     def points_rule(values: np.ndarray, centres: np.ndarray, mids: np.ndarray) -> np.ndarray:
         k = np.maximum(valence, 1)[:, None]
         q = _sum(centres[face_of], corners, n) / np.maximum(face_count, 1)[:, None]
         r = _sum(np.repeat(mids, 2, axis=0), edges.reshape(-1), n) / k
         smooth = (q + 2 * r + (k - 3) * values) / k
-        ends = edges[is_sharp]
-        others = _sum(np.concatenate([values[ends[:, 1]], values[ends[:, 0]]]), np.concatenate([ends[:, 0], ends[:, 1]]), n)
-        crease = (6 * values + others) / 8
-        out = smooth.copy()
-        two = (creases == 2) & ~corner
-        blend = np.clip(sharp_sum[:, 0] / 2, 0, 1)[:, None]
-        out = np.where(two[:, None], smooth + (crease - smooth) * blend, out)
-        amount = np.where(own > 0, own, sharp_sum[:, 0] / np.maximum(creases, 1))
-        amount = np.where(boundary & (face_count == 1), 1.0, np.clip(amount, 0, 1))[:, None]
-        base = np.where((creases >= 2)[:, None] & boundary[:, None], crease, smooth)
-        out = np.where(corner[:, None], base + (values - base) * amount, out)
+
+        def by_rule(edge_sharp: np.ndarray, point_sharp: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+            ends = edges[edge_sharp > 0]
+            creases = np.bincount(ends.reshape(-1), minlength=n)
+            others = _sum(np.concatenate([values[ends[:, 1]], values[ends[:, 0]]]), np.concatenate([ends[:, 0], ends[:, 1]]), n)
+            rule = np.where((point_sharp > 0) | (creases > 2), 2, creases == 2)
+            out = np.where((rule == 1)[:, None], (6 * values + others) / 8, smooth)
+            return np.where((rule == 2)[:, None], values, out), rule
+
+        now, rule = by_rule(sharp, own)
+        then, rule_then = by_rule(later, own_later)
+        changes = ((rule > 0) & (rule_then != rule))[:, None]
+        out = np.where(changes, then + (now - then) * share, now)
         return np.where((valence == 0)[:, None], values, out)
 
     previous = np.arange(len(corners)) - 1
@@ -98,15 +101,18 @@ def catmull_clark(mesh: Polygons, corners_sharp: bool = True) -> Polygons:
         centres = _mean(values, face_of, faces, counts)[face_of]
         half, back = (values + values[following]) / 2, (values + values[previous]) / 2
         child.corner[name] = np.stack([values, half, centres, back], axis=1).reshape(-1, values.shape[1])
-    kept = is_sharp & (uses == 2)
-    left = np.where(sharp >= INFINITE, sharp, sharp - 1)
-    kept &= left > 0
+    kept = (later > 0) & (uses == 2)
     new = n + np.flatnonzero(kept)
     child.edges = np.concatenate([np.stack([edges[kept, 0], new], axis=1), np.stack([new, edges[kept, 1]], axis=1)])
-    child.sharpness = np.concatenate([left[kept], left[kept]])
+    child.sharpness = np.concatenate([later[kept], later[kept]])
     child.point_sharpness = np.zeros(len(child.points))
-    child.point_sharpness[:n] = np.where(own >= INFINITE, own, np.maximum(own - 1, 0))
+    child.point_sharpness[:n] = own_later
     return child
+
+
+def _next(sharpness: np.ndarray) -> np.ndarray:
+    """Sharpness one level on."""
+    return np.where(sharpness >= INFINITE, sharpness, np.maximum(sharpness - 1, 0))
 
 
 def smooth_normals(mesh: Polygons) -> np.ndarray:
