@@ -111,6 +111,20 @@ def test_missing_converter_is_one_clear_error(blender, shot, tmp_path, monkeypat
         blender.ops.render.buzz_export(convert=True)
 
 
+def test_blender_installs_and_enables_it(package, tmp_path):
+    """Through Blender's own installer, in a Blender with its own settings folder; then an export under its real name."""
+    code = f"""
+import bpy
+bpy.ops.extensions.package_install_files(filepath={str(package / "buzz.zip")!r}, repo="user_default", enable_on_install=True)
+assert "bl_ext.user_default.buzz_gltf" in bpy.context.preferences.addons
+assert bpy.ops.export_scene.buzz_gltf(filepath={str(tmp_path / "x.gltf")!r}) == {{"FINISHED"}}
+"""
+    command = [sys.executable, "-c", code]
+    done = subprocess.run(command, capture_output=True, text=True, env={**os.environ, "BLENDER_USER_RESOURCES": str(tmp_path)}, timeout=120, check=False)
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert (tmp_path / "x.gltf").is_file()
+
+
 def test_progress_is_parsed_and_errors_are_kept():
     from exporters.blender.background import Task
 
