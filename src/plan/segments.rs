@@ -6,12 +6,17 @@ use super::Step;
 /// lines, cleaning up.
 const INFERENCE: f64 = 0.12;
 
-/// Share of pixels that decay tends to at a pixel or more of motion a frame. One sample a pixel, carried on, tends to
-/// a random pattern: the price of the half-pixel guarantee.
-const DECAYED: f64 = 0.24;
+/// Share of pixels that samples carried on lose in the end, at little and at much motion. One sample a pixel, pushed
+/// forward frame after frame, tends to a random pattern: the price of the half-pixel guarantee.
+const DECAYED: [f64; 2] = [0.25, 0.34];
 
-/// Steps after which the pattern is random to a share of 1 - 1/e.
-const DECAY_STEPS: f64 = 9.0;
+/// Motion in pixels a frame at which the second of [`DECAYED`] is reached.
+const MUCH_MOTION: f64 = 30.0;
+
+/// Share of the way to that pattern which one step goes at most, and the motion that goes most of it. Fitted, with the
+/// two above, to frames of an interior dolly at 1-30 pixels a frame and a walk through an atrium at 3-35.
+const STEP_DECAY: f64 = 0.4;
+const DECAY_MOTION: f64 = 10.0;
 
 /// Predicted costs of the frames inferred outward from one key frame.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -38,11 +43,11 @@ impl Chain {
     /// the key: at most half of them before it, so that together they keep to the length.
     pub fn of_shot(steps: &[Step], others: usize) -> Vec<Self> {
         let predict = |steps: &mut dyn Iterator<Item = (f64, f64, bool)>, longest: usize| {
-            let mut steady = 1.0;
+            let mut order = 1.0;
             let chain = steps.take(longest).map_while(|(new, pixels, changed)| {
-                let stirred = (pixels / 0.5).min(1.0);
-                steady *= (-stirred / DECAY_STEPS).exp();
-                let traced = (new + DECAYED * (1.0 - steady)).min(1.0);
+                order *= (-STEP_DECAY * (1.0 - (-pixels / DECAY_MOTION).exp())).exp();
+                let decayed = DECAYED[0] + (DECAYED[1] - DECAYED[0]) * (pixels / MUCH_MOTION).min(1.0);
+                let traced = (new + decayed * (1.0 - order)).min(1.0);
                 (!changed && traced <= Step::DEAR).then_some(traced)
             });
             chain.collect::<Vec<_>>()
