@@ -13,16 +13,17 @@ mod intersect;
 mod opacity;
 mod tree;
 mod triangle;
+mod wide;
 
 use crate::frame::SurfaceRef;
 use crate::scene::{Mesh, Pose, Scene};
 use deform::{Deformed, Shape, affine, is_deformable};
 use glam::{Affine3A, DAffine3, DVec3, Mat3A, Vec3, Vec3A, Vec4};
 pub use intersect::{RayHit, Sides};
-use obvhs::cwbvh::CwBvh;
 use rayon::prelude::*;
 use std::collections::HashMap;
-use tree::{Bounds, Tree, build_over};
+use tree::{Bounds, Tree, build};
+use wide::WideTree;
 
 /// The scene as rays meet it. See the [module](self).
 pub struct Accel {
@@ -36,11 +37,10 @@ pub struct Accel {
     placements: Vec<Placement>,
     /// What can be met, in the order of the upper tree.
     placed: Vec<Placed>,
-    upper: CwBvh,
+    upper: WideTree,
+    /// Entries that a ray may have pending at once in both levels.
+    pending: usize,
     bounds: Bounds,
-    /// Length of the unit in which rays are parametrised inside the trees: a power of two, so that it costs no
-    /// precision. `obvhs` takes any box that a ray leaves before t = 1e-4 for behind it, which must be short.
-    unit: f32,
 }
 
 /// Instances that share a transform and a tree.
@@ -93,9 +93,9 @@ impl Accel {
             deformed: scene.instances.iter().map(|_| None).collect(),
             placements: vec![Placement::default(); scene.instances.len()],
             placed: Vec::new(),
-            upper: CwBvh::default(),
+            upper: WideTree::default(),
+            pending: 0,
             bounds: Bounds::default(),
-            unit: 1.0,
         }
     }
 
@@ -168,13 +168,12 @@ impl Accel {
             all.include(b.max);
             all
         });
-        self.upper = build_over(&bounds, &self.bounds);
+        let (upper, order) = build(&bounds, self.bounds.reach());
+        let lower = placed.iter().map(|p| self.trees[self.groups[p.group].tree].wide.pending()).max();
+        self.pending = upper.pending() + lower.unwrap_or(0);
+        self.upper = upper;
         let mut slots: Vec<Option<Placed>> = placed.into_iter().map(Some).collect();
-        self.placed = self.upper.primitive_indices.iter().filter_map(|&i| slots[i as usize].take()).collect();
-        let size = (self.bounds.max - self.bounds.min).max_element();
-        // A scene is 2^13 to 2^14 units across; the exponent alone, so a power of two.
-        let size = if size > 0.0 { size.clamp(1e-20, 1e20) } else { 1.0 };
-        self.unit = f32::from_bits(size.to_bits() & 0x7f80_0000) / 8192.0;
+        self.placed = order.iter().filter_map(|&i| slots[i as usize].take()).collect();
     }
 
     /// World position of render space's origin.
@@ -202,7 +201,7 @@ impl Accel {
     pub fn memory_bytes(&self) -> u64 {
         let trees: usize = self.trees.iter().map(Tree::memory_bytes).sum();
         let deformed: usize = self.deformed.iter().flatten().map(|d| d.memory_bytes()).sum();
-        let upper = size_of_val(self.upper.nodes.as_slice()) + size_of_val(self.placed.as_slice());
+        let upper = self.upper.memory_bytes() + size_of_val(self.placed.as_slice());
         (trees + deformed + upper) as u64
     }
 

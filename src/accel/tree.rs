@@ -2,12 +2,11 @@
 
 use super::opacity;
 use super::triangle::TreeTriangle;
+use super::wide::WideTree;
 use crate::scene::Scene;
-use glam::{Vec3, Vec3A};
-use obvhs::Boundable;
+use glam::Vec3;
 use obvhs::aabb::Aabb;
 use obvhs::bvh2::reinsertion::ReinsertionOptimizer;
-use obvhs::cwbvh::CwBvh;
 use obvhs::cwbvh::bvh2_to_cwbvh::bvh2_to_cwbvh;
 use obvhs::ploc::{PlocBuilder, PlocSearchDistance, SortPrecision};
 
@@ -25,7 +24,7 @@ const FAR: f32 = 4.0;
 /// A tree over triangles, which lie in its order.
 #[derive(Default)]
 pub(super) struct Tree {
-    pub bvh: CwBvh,
+    pub wide: WideTree,
     pub triangles: Vec<TreeTriangle>,
     /// What the triangles span; minimum above maximum where there are none.
     pub bounds: Bounds,
@@ -82,9 +81,14 @@ impl Bounds {
         if start.is_finite() { start } else { 0.0 }
     }
 
-    fn padded(&self, reach: f32) -> Aabb {
-        let padding = Vec3A::splat(reach * PADDING);
-        Aabb::new(Vec3A::from(self.min) - padding, Vec3A::from(self.max) + padding)
+    pub fn join(&mut self, other: &Self) {
+        (self.min, self.max) = (self.min.min(other.min), self.max.max(other.max));
+    }
+
+    /// Larger on all sides by the padding of a tree that reaches so far.
+    fn padded(self, reach: f32) -> Self {
+        let padding = Vec3::splat(reach * PADDING);
+        Self { min: self.min - padding, max: self.max + padding }
     }
 }
 
@@ -106,44 +110,39 @@ impl Tree {
                 }
             }
         }
-        let reach = bounds.reach();
-        let boxes: Vec<Aabb> = triangles
-            .iter()
-            .map(|t| {
-                let mut bounds = Bounds::default();
-                t.corners().into_iter().for_each(|p| bounds.include(p));
-                bounds.padded(reach)
-            })
-            .collect();
-        let bvh = build(&boxes);
-        let triangles = bvh.primitive_indices.iter().map(|&i| triangles[i as usize]).collect();
-        Self { bvh, triangles, bounds }
+        let boxes = triangles.iter().map(|t| {
+            let mut bounds = Bounds::default();
+            t.corners().into_iter().for_each(|p| bounds.include(p));
+            bounds
+        });
+        let (wide, order) = build(&boxes.collect::<Vec<_>>(), bounds.reach());
+        let triangles = order.iter().map(|&i| triangles[i as usize]).collect();
+        Self { wide, triangles, bounds }
     }
 
     pub fn memory_bytes(&self) -> usize {
-        size_of_val(self.triangles.as_slice())
-            + size_of_val(self.bvh.nodes.as_slice())
-            + size_of_val(self.bvh.primitive_indices.as_slice())
+        size_of_val(self.triangles.as_slice()) + self.wide.memory_bytes()
     }
 }
 
-/// A tree over boxes that together span `all`.
-pub(super) fn build_over(bounds: &[Bounds], all: &Bounds) -> CwBvh {
-    let boxes: Vec<Aabb> = bounds.iter().map(|b| b.padded(all.reach())).collect();
-    build(&boxes)
-}
-
-/// An eight-wide tree. The parameters are `BvhBuildParams::medium_build`'s, which build a quarter of a million
-/// triangles in about a fifth of a second; the slower presets traced no more than a few per cent faster.
-fn build<T: Boundable>(boxes: &[T]) -> CwBvh {
-    if boxes.is_empty() {
-        return CwBvh::default();
+/// An eight-wide tree over boxes that lie within `reach` of the origin, and their order in it.
+///
+/// The parameters are `BvhBuildParams::medium_build`'s, which build a quarter of a million triangles in a tenth of a
+/// second. Slower presets, splitting long triangles included, traced no faster than the noise of the measurement.
+pub(super) fn build(bounds: &[Bounds], reach: f32) -> (WideTree, Vec<u32>) {
+    if bounds.is_empty() {
+        return (WideTree::default(), Vec::new());
     }
+    let padded: Vec<Bounds> = bounds.iter().map(|b| b.padded(reach)).collect();
+    let boxes: Vec<Aabb> = padded.iter().map(|b| Aabb::new(b.min.into(), b.max.into())).collect();
     let indices = (0..boxes.len() as u32).collect();
     let mut builder = PlocBuilder::with_capacity(boxes.len());
-    let mut bvh2 = builder.build(PlocSearchDistance::Medium, boxes, indices, SortPrecision::U64, 3);
+    let mut bvh2 = builder.build(PlocSearchDistance::Medium, &boxes, indices, SortPrecision::U64, 3);
     ReinsertionOptimizer::default().run(&mut bvh2, 0.05, None);
-    bvh2_to_cwbvh(&bvh2, 3, true, false)
+    let bvh = bvh2_to_cwbvh(&bvh2, 3, true, false);
+    let order = bvh.primitive_indices.clone();
+    let ordered: Vec<Bounds> = order.iter().map(|&i| padded[i as usize]).collect();
+    (WideTree::new(&bvh, &ordered), order)
 }
 
 fn has_area([a, b, c]: [Vec3; 3]) -> bool {
