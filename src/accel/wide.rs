@@ -64,14 +64,14 @@ impl SlabRay {
         let t_max = Vec4::splat(t_max);
         let mut enters = [Vec4::ZERO; 2];
         let mut mask = 0;
-        for half in 0..2 {
+        for (half, enters) in enters.iter_mut().enumerate() {
             let side = |axis: usize, near: usize| {
                 (node.bounds[axis][near & 1][half] - self.origin[axis]) * self.inverse[axis]
             };
             let [nx, ny, nz] = self.near;
             let enter = side(0, nx).max(side(1, ny)).max(side(2, nz).max(self.t_min));
             let leave = side(0, nx ^ 1).min(side(1, ny ^ 1)).min(side(2, nz ^ 1)) * FAR_SIDE;
-            enters[half] = enter;
+            *enters = enter;
             mask |= enter.cmple(leave.min(t_max)).bitmask() << (4 * half);
         }
         (enters, mask)
