@@ -1,2 +1,7 @@
 //! `buzz-convert`: animated glTF in, EXR sequence out.
-fn main() {}
+
+mod cli;
+
+fn main() -> std::process::ExitCode {
+    cli::run()
+}

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from mesh import unit
+from mesh import rotation_x, rotation_y, rotation_z, unit
 
 
 def spline(keys, frames):
@@ -32,14 +32,19 @@ def _second_derivatives(at, values):
     return np.linalg.solve(matrix, right)
 
 
-def look_at(eyes, targets, roll=0.0):
-    """Rotation matrices (world from camera) that look from eyes to targets, rolled by degrees about the view axis."""
-    back = unit(np.asarray(eyes, float) - targets)
-    right = unit(np.cross([0.0, 1.0, 0.0], back))
-    up = np.cross(back, right)
-    angle = np.radians(np.broadcast_to(roll, len(back)))[:, None]
-    rolled_right = np.cos(angle) * right + np.sin(angle) * up
-    return np.stack([rolled_right, np.cross(back, rolled_right), back], axis=-1)
+def look_along(heading, pitch=0.0, roll=0.0):
+    """Rotation matrices (world from camera) from angles in degrees.
+
+    Heading 0 looks along -z and grows to the right, pitch looks up, roll tips the camera to its left.
+    """
+    angles = np.broadcast_arrays(heading, pitch, roll)
+    return np.array([rotation_y(-h) @ rotation_x(p) @ rotation_z(r) for h, p, r in zip(*angles, strict=True)])
+
+
+def look_at(eyes, targets):
+    """Rotation matrices (world from camera) that look from eyes to targets, the horizon level."""
+    x, y, z = (np.asarray(targets, float) - eyes).T
+    return look_along(np.degrees(np.arctan2(x, -z)), np.degrees(np.arctan2(y, np.hypot(x, z))))
 
 
 def quaternions(rotations):

@@ -1,6 +1,6 @@
 """courtyard: a paved yard with an arcade, a fountain, a well and two lanterns, walked through in the afternoon sun.
 
-96 frames at 24 a second. The walk begins inside the gate, pans fast from the fountain to the well at frames 34-42, and
+96 frames at 24 a second. The walk begins inside the gate, pans fast from the fountain to the well at frames 33-43, and
 cuts at frame 60 to a low shot that rises beside the fountain.
 """
 
@@ -10,11 +10,12 @@ import camera
 import mesh
 import texture
 from gltf import Scene
-from mesh import box, cards, disc, join, lathe, quad, sphere, unit, wall
+from mesh import box, cards, disc, join, lathe, polygon, quad, sphere, unit, wall
 from texture import courses, mix, noise, normal_map, ramp, smoothstep
 
 FRAMES = 96
 CUT = 60
+PAN = (33, 43)
 
 #: The yard's inner walls stand at x = +-EAST and z = +-NORTH; north is -z.
 EAST, NORTH = 10.0, 8.0
@@ -27,9 +28,9 @@ def build():
     """The whole scene."""
     scene = Scene("courtyard")
     materials = make_materials(scene)
-    for part in (ground, north_side, other_sides, roofs, tower, fountain, well, greenery, furniture, lanterns):
+    for part in (ground, buildings, roofs, tower, fountain, well, greenery, furniture, lanterns):
         part(scene, materials)
-    scene.sun("Sun", direction=(0.55, -0.75, -0.42), watts_per_m2=4.2, colour=(1.0, 0.91, 0.78))
+    scene.sun("Sun", direction=(0.55, -0.75, -0.42), watts_per_m2=3.7, colour=(1.0, 0.91, 0.78))
     move_camera(scene)
     return scene
 
@@ -39,17 +40,17 @@ def build():
 
 def make_materials(scene):
     """Every material, by name."""
-    return {**masonry(scene), **stone_and_clay(scene), **wood_and_metal(scene), **living(scene)}
+    return {**masonry(scene), **plaster(scene), **stone_and_clay(scene), **wood_and_metal(scene), **living(scene)}
 
 
 def masonry(scene):
-    """Paving, brick and plaster: textures with normal maps."""
-    edge, tone = courses(512, 8, 6, seed=11, jitter=0.5)
+    """Paving and brick: stones with a tone each and joints that lie lower."""
+    edge, tone = courses(512, 7, 5, seed=11, jitter=0.7)
     grain = noise(512, 8, seed=12, octaves=5)
-    stone = smoothstep(0.002, 0.012, edge)
-    colour = ramp(0.65 * tone + 0.35 * grain, (0.45, 0.41, 0.36), (0.62, 0.57, 0.49), (0.73, 0.67, 0.58))
+    stone = smoothstep(0.001, 0.006, edge)
+    colour = ramp(0.65 * tone + 0.35 * grain, (0.47, 0.42, 0.35), (0.63, 0.56, 0.46), (0.74, 0.66, 0.54))
     colour = mix(np.full_like(colour, 0.27) * [1.0, 0.98, 0.85], colour, stone) * (0.84 + 0.32 * grain[..., None])
-    relief = 0.7 * smoothstep(0.0, 0.02, edge) + 0.3 * grain + 0.15 * tone
+    relief = 0.7 * smoothstep(0.0, 0.012, edge) + 0.35 * grain + 0.15 * tone
     # Worn stones are smoother than the joints between them.
     rough = np.stack([np.zeros_like(edge), 0.95 - 0.45 * stone * (0.5 + 0.5 * tone), np.zeros_like(edge)], axis=-1)
     paving = scene.material(
@@ -57,7 +58,7 @@ def masonry(scene):
         roughness=1.0,
         texture=scene.texture("paving", colour),
         normal=scene.texture("paving_normal", normal_map(relief, 6.0)),
-        metallic_roughness=scene.texture("paving_roughness", rough[::2, ::2], levels=24),
+        metallic_roughness=scene.texture("paving_roughness", rough[::2, ::2], step=8),
     )
 
     edge, tone = courses(512, 16, 6, seed=21, jitter=0.12)
@@ -71,18 +72,19 @@ def masonry(scene):
         texture=scene.texture("brick", colour),
         normal=scene.texture("brick_normal", normal_map(0.8 * smoothstep(0, 0.012, edge) + 0.3 * grain, 4.0)),
     )
+    return {"paving": paving, "brick": brick}
 
+
+def plaster(scene):
+    """One rough plaster in three colours."""
     stains, grain = noise(256, 3, seed=31, octaves=5), noise(256, 32, seed=35, octaves=3)
     colour = ramp(stains, (0.78, 0.58, 0.33), (0.89, 0.72, 0.46), (0.94, 0.81, 0.58)) * (0.93 + 0.14 * grain[..., None])
-    plaster_texture = scene.texture("plaster", colour)
-    plaster_normal = scene.texture("plaster_normal", normal_map(grain, 1.6))
-    plaster = {"texture": plaster_texture, "normal": plaster_normal, "roughness": 0.95}
+    maps = {"texture": scene.texture("plaster", colour)}
+    maps["normal"] = scene.texture("plaster_normal", normal_map(grain, 1.6))
     return {
-        "paving": paving,
-        "brick": brick,
-        "plaster": scene.material("Ochre plaster", **plaster),
-        "pale": scene.material("Pale plaster", colour=(0.95, 1.0, 1.15 / 1.2), **plaster),
-        "rose": scene.material("Rose plaster", colour=(1.0, 0.72, 0.62), **plaster),
+        "plaster": scene.material("Ochre plaster", roughness=0.95, **maps),
+        "pale": scene.material("Pale plaster", colour=(0.95, 1.0, 0.96), roughness=0.95, **maps),
+        "rose": scene.material("Rose plaster", colour=(1.0, 0.72, 0.62), roughness=0.95, **maps),
     }
 
 
@@ -107,11 +109,11 @@ def stone_and_clay(scene):
 
 def wood_and_metal(scene):
     """Doors, shutters, iron, brass, window glass and lamp bulbs."""
-    fibre = noise(256, 24, seed=71, octaves=3)
-    planks = np.abs(((np.arange(256) / 64) % 1) - 0.5)[None, :] * np.ones((256, 1))
-    fibre = np.roll(np.repeat(fibre[::8], 8, axis=0), 3, axis=0)
+    # Four planks side by side, their fibres upright.
+    fibre = np.repeat(noise(256, 24, seed=71, octaves=3)[::8], 8, axis=0)
     colour = ramp(fibre, (0.33, 0.20, 0.11), (0.51, 0.34, 0.20), (0.63, 0.45, 0.28))
-    wood = scene.texture("wood", colour * (0.35 + 0.65 * smoothstep(0.5, 0.46, planks))[..., None])
+    from_middle = np.abs(np.arange(256) / 64 % 1 - 0.5)
+    wood = scene.texture("wood", colour * (0.35 + 0.65 * smoothstep(0.5, 0.46, from_middle))[None, :, None])
     return {
         "wood": scene.material("Wood", texture=wood, roughness=0.6),
         "green wood": scene.material("Green wood", colour=(0.35, 0.85, 0.75), texture=wood, roughness=0.45),
@@ -172,16 +174,20 @@ def column():
     return join([box((-0.34, 0, -0.34), (0.34, 0.12, 0.34)), shaft, box((-0.34, 2.46, -0.34), (0.34, SPRING, 0.34))])
 
 
-def north_side(scene, materials):
+def buildings(scene, materials):
+    """The four sides of the yard, which share their windows and doors."""
+    window, door = window_mesh(scene, materials), door_mesh(scene, materials)
+    north_side(scene, materials, window, door)
+    other_sides(scene, materials, window, door)
+
+
+def north_side(scene, materials, window, door):
     """The arcade, the range behind it with its doors and windows, and the lean-to roof's ceiling."""
     pillar = scene.mesh("Column", (column(), materials["limestone"]))
     for i in range(BAYS + 1):
         scene.node(f"Column {i}", (-EAST + BAY * i, 0, -NORTH - 0.3), mesh=pillar)
-    # The vault's voussoirs: a thin limestone arch that stands out from the plaster.
     bay = mesh.arch(3.2, BAY, SPRING, ARCH_TOP, 0.5, tile=2.0)
-    trim = mesh.arch(3.2, 3.7, SPRING, SPRING + 1.85, 0.56, tile=1.0)
-    trim = _ring_only(trim, 1.62, 1.82).moved((0, 0, 0.03))
-    arch = scene.mesh("Arch", (bay, materials["plaster"]), (trim, materials["limestone"]))
+    arch = scene.mesh("Arch", (bay, materials["plaster"]), (moulding(1.62, 1.82), materials["limestone"]))
     for i in range(BAYS):
         scene.node(f"Arch {i}", (-EAST + BAY * (i + 0.5), 0, -NORTH - 0.05), mesh=arch)
 
@@ -189,36 +195,30 @@ def north_side(scene, materials):
     doors = [(1.3 + BAY * i, 0.0, 2.7 + BAY * i, 2.3) for i in range(BAYS)]
     upper = [(1.4 + BAY * i, 5.35, 2.6 + BAY * i, 6.75) for i in range(BAYS)]
     back = wall(2 * EAST, EAVE + 0.3, doors + upper, 0.25, tile=2.0).moved((-EAST, 0, z))
-    ceiling = quad((-EAST, ARCH_TOP - 0.4, z), (EAST, ARCH_TOP - 0.4, z), (EAST, ARCH_TOP - 0.4, -NORTH - 0.5),
-                   (-EAST, ARCH_TOP - 0.4, -NORTH - 0.5))  # fmt: skip
-    beams = [
-        box((x - 0.09, ARCH_TOP - 0.62, z), (x + 0.09, ARCH_TOP - 0.4, -NORTH - 0.5), skip="zZY")
-        for x in np.arange(-9.5, 9.6, 1.0)
-    ]
+    top, front = ARCH_TOP - 0.4, -NORTH - 0.5
+    ceiling = quad((-EAST, top, z), (EAST, top, z), (EAST, top, front), (-EAST, top, front))
+    beams = [box((x - 0.09, top - 0.22, z), (x + 0.09, top, front), skip="zY") for x in np.arange(-9.5, 9.6, 1.0)]
     scene.node("North wall", mesh=scene.mesh("North wall", (back, materials["plaster"])))
     scene.node("Ceiling", mesh=scene.mesh("Ceiling", (join([ceiling, *beams]), materials["wood"])))
 
-    leaf, glazing = door_mesh(scene, materials), window_mesh(scene, materials)
     for i in range(BAYS):
-        scene.node(f"Door {i}", (-EAST + BAY * (i + 0.5), 0, z - 0.2), mesh=leaf)
-        scene.node(f"North window {i}", (-EAST + BAY * (i + 0.5), 5.35, z), mesh=glazing)
+        scene.node(f"Door {i}", (-EAST + BAY * (i + 0.5), 0, z - 0.2), mesh=door)
+        scene.node(f"North window {i}", (-EAST + BAY * (i + 0.5), 5.35, z), mesh=window)
 
 
-def _ring_only(arch, inner, outer):
-    """The part of an arch's faces between two radii about its centre, pushed out to make a moulding."""
-    curve_in, curve_out = mesh.arch_points(2 * inner, SPRING, 24), mesh.arch_points(2 * outer, SPRING, 24)
-    front_in = np.column_stack([curve_in, np.zeros(25)])
-    front_out = np.column_stack([curve_out, np.zeros(25)])
-    depth = np.array([0, 0, 0.06])
-    return join([mesh.strip(front_out, front_in), mesh.strip(front_out - depth, front_out)])
+def moulding(inner, outer, proud=0.03, segments=24):
+    """The limestone ring around an arch, between two radii, that stands out from the plaster."""
+    curves = [mesh.arch_points(2 * radius, SPRING, segments) for radius in (inner, outer)]
+    inside, outside = (np.column_stack([curve, np.full(segments + 1, proud)]) for curve in curves)
+    return join([mesh.strip(outside, inside), mesh.strip(outside - [0, 0, 2 * proud], outside)])
 
 
 def window_mesh(scene, materials):
     """A window 1.2 m by 1.4 m with panes, sill, lintel and open shutters; x centred, y from the sill, wall at z = 0."""
     pane = quad((-0.6, 0, -0.18), (0.6, 0, -0.18), (0.6, 1.4, -0.18), (-0.6, 1.4, -0.18))
-    bars = [(-0.6, 0.6, y, y + 0.06) for y in (0.0, 0.46, 0.9, 1.34)]
-    bars += [(x, x + 0.06, 0.0, 1.4) for x in (-0.6, -0.03, 0.54)]
-    frame = join(box((x0, y0, -0.18), (x1, y1, -0.12), skip="z") for x0, x1, y0, y1 in bars)
+    # The uprights stand a little proud: no two faces lie in one another.
+    bars = [box((-0.6, y, -0.18), (0.6, y + 0.06, -0.125), skip="z") for y in (0.0, 0.46, 0.9, 1.34)]
+    bars += [box((x, 0, -0.18), (x + 0.06, 1.4, -0.12), skip="z") for x in (-0.6, -0.03, 0.54)]
     trim = join([box((-0.75, -0.12, -0.1), (0.75, 0, 0.12)), box((-0.75, 1.4, -0.1), (0.75, 1.58, 0.05))])
     slats = [box((0.66, 0.02 + 0.115 * i, 0.03), (1.22, 0.10 + 0.115 * i, 0.06), 0.6, skip="z") for i in range(12)]
     shutter = join([box((0.62, 0, 0.015), (1.26, 1.4, 0.045), 0.6, skip="z"), *slats])
@@ -226,7 +226,7 @@ def window_mesh(scene, materials):
     return scene.mesh(
         "Window",
         (pane, materials["glass"]),
-        (frame, materials["white wood"]),
+        (join(bars), materials["white wood"]),
         (trim, materials["limestone"]),
         (shutters, materials["green wood"]),
     )
@@ -257,9 +257,8 @@ def door_mesh(scene, materials, width=1.4, height=2.3):
     )
 
 
-def other_sides(scene, materials):
+def other_sides(scene, materials, window, door):
     """East in brick, west in rose plaster, south a lower wall with the gate; each seen from inside the yard."""
-    glazing, door = window_mesh(scene, materials), door_mesh(scene, materials)
     length = 2 * NORTH + ARCADE_DEPTH
     low = [(2.4 + 4.2 * i, 1.1, 3.6 + 4.2 * i, 2.5) for i in (0, 1, 3)]
     high = [(2.4 + 4.2 * i, 4.8, 3.6 + 4.2 * i, 6.2) for i in range(4)]
@@ -275,7 +274,7 @@ def other_sides(scene, materials):
         scene.node(f"{name} wall", (x, 0, z), turn=turn, mesh=parts)
         inward = -np.sign(x)
         for i, (x0, y0, x1, _) in enumerate(low + high):
-            scene.node(f"{name} window {i}", (x, y0, z + along * (x0 + x1) / 2), turn=turn, mesh=glazing)
+            scene.node(f"{name} window {i}", (x, y0, z + along * (x0 + x1) / 2), turn=turn, mesh=window)
         middle = z + along * (doorway[0] + doorway[2]) / 2
         scene.node(f"{name} door", (x - 0.2 * inward, 0, middle), turn=turn, mesh=door)
 
@@ -303,15 +302,13 @@ def tile_column(tiles, length=0.42):
     pieces = []
     for i in range(tiles):
         near, far = -length * i + 0.04, -length * (i + 1)
-        # The lower end of a tile lies on the one below it.
+        # The lower end of a tile lies on the one below it, and is closed as if filled with mortar.
         low = np.column_stack([arc * 1.06 + [0, 0.045], np.full(7, near)])
         high = np.column_stack([arc * 0.92 + [0, 0.005], np.full(7, far)])
-        pieces.append(mesh.strip(low, high, 0.9, smooth=True))
-        # The rim that shows the tile's thickness, and a different patch of the texture for every tile.
-        rim = np.column_stack([arc * 0.9 + [0, 0.03], np.full(7, near)])
-        pieces.append(mesh.strip(rim, low, 0.9))
-        for piece in pieces[-2:]:
-            piece.uvs = piece.uvs + [0.37 * i, 0.61 * i]
+        tile = join([mesh.strip(high, low, 0.9, smooth=True), polygon(low[::-1], 0.9)])
+        # Every tile shows a different patch of the texture.
+        tile.uvs += [0.37 * i, 0.61 * i]
+        pieces.append(tile)
     bed = quad((-0.125, -0.01, 0), (0.125, -0.01, 0), (0.125, -0.01, -length * tiles), (-0.125, -0.01, -length * tiles))
     return join([*pieces, bed])
 
@@ -319,7 +316,7 @@ def tile_column(tiles, length=0.42):
 def roofs(scene, materials):
     """Tiled slopes that fall towards the yard on three sides, and the lean-to over the arcade."""
     slope = mesh.rotation_x(24)
-    long = tile_column(9).transformed(slope)
+    long = tile_column(8).transformed(slope)
     short = tile_column(6).transformed(slope)
     board = box((-0.125, -0.16, -0.45), (0.125, -0.02, -0.02), 1.0, skip="xX")
     column_mesh = scene.mesh("Tile column", (long, materials["tiles"]), (board, materials["wood"]))
@@ -341,12 +338,11 @@ def tower(scene, materials):
     base, shaft_top, belfry_top = (6.5, -17.0), 12.5, 16.0
     shaft = box((-1.8, 0, -1.8), (1.8, shaft_top, 1.8), 2.0, skip="yY")
     band = join(box((-1.95, y, -1.95), (1.95, y + 0.25, 1.95)) for y in (9.0, shaft_top, belfry_top))
-    side = mesh.arch(2.0, 3.6, shaft_top + 1.6, belfry_top, 0.5, tile=2.0)
-    pier = box((-1.8, shaft_top, -0.5), (-1.0, shaft_top + 1.6, 0), 2.0, skip="yY")
-    side = join([side, pier, pier.moved((2.8, 0, 0))]).moved((0, 0, 1.8))
-    belfry = join(side.moved(turn=turn) for turn in (0, 90, 180, 270))
+    side = mesh.arch(2.0, 3.6, shaft_top + 1.6, belfry_top, 0.5, tile=2.0).moved((0, 0, 1.8))
+    pier = box((1.0, shaft_top, 1.0), (1.8, shaft_top + 1.6, 1.8), 2.0, skip="yY")
+    belfry = join(part.moved(turn=turn) for part in (side, pier) for turn in (0, 90, 180, 270))
     corners = [(-2.1, 16.2, 2.1), (2.1, 16.2, 2.1), (2.1, 16.2, -2.1), (-2.1, 16.2, -2.1)]
-    spire = join(mesh.polygon([corners[i], corners[(i + 1) % 4], (0, 18.6, 0)], 1.0) for i in range(4))
+    spire = join(polygon([corners[i], corners[(i + 1) % 4], (0, 18.6, 0)], 1.0) for i in range(4))
     bell = lathe([(0.45, 0), (0.38, 0.15), (0.3, 0.45), (0.24, 0.65), (0.0, 0.75)], 24).moved((0, 13.6, 0))
     finial = join([lathe([(0.04, 18.4), (0.04, 19.5), (0.0, 19.6)], 8), sphere(10, 16, 0.16).moved((0, 19.0, 0))])
     parts = scene.mesh(
@@ -399,15 +395,16 @@ def well(scene, materials):
     rope = rope.moved((0.1, 0, 0.1))
     bucket = lathe([(0.0, 1.25), (0.13, 1.25), (0.13, 1.25), (0.17, 1.55)], 16).moved((0.1, -0.25, 0.1))
     pail = join([bucket, lathe([(0.16, 1.55), (0.12, 1.27), (0.0, 1.27)], 16).moved((0.1, -0.25, 0.1))])
-    tiles = tile_column(2, length=0.5).transformed(mesh.rotation_x(32))
-    slope = [tiles.moved((x, 2.42, 0.88)) for x in np.arange(-0.875, 0.9, 0.25)]
-    roof = join(slope)
+    columns = [tile_column(2, length=0.5).moved((x, 0, 0)) for x in np.arange(-0.875, 0.9, 0.25)]
+    boards = box((-1.0, -0.06, -1.0), (1.0, -0.02, -0.02), 1.0)
+    slope, eave = mesh.rotation_x(32), (0, 2.42, 0.88)
+    roof, boards = join(columns).transformed(slope, eave), boards.transformed(slope, eave)
     water = disc(0.58, 32, 0.3)
     parts = scene.mesh(
         "Well",
         (join([wall_ring, inside]), materials["brick"]),
         (rim, materials["limestone"]),
-        (join([posts, drum, ridge, rope, pail]), materials["wood"]),
+        (join([posts, drum, ridge, rope, pail, boards, boards.moved(turn=180)]), materials["wood"]),
         (join([roof, roof.moved(turn=180)]), materials["tiles"]),
         (water, materials["water"]),
     )
@@ -428,7 +425,7 @@ def tree(random):
     trunk = lathe([(0.2, 0), (0.13, 0.25), (0.1, 1.0), (0.085, 2.0), (0.05, 2.9)], 12)
     trunk.positions[:, 0] += 0.06 * np.sin(1.4 * trunk.positions[:, 1])
     centres = [(0, 3.1, 0), (0.55, 2.8, 0.3), (-0.5, 2.9, 0.35), (0.1, 2.75, -0.55), (-0.1, 3.6, 0.05)]
-    crown = [blob(random, 230, (0.75, 0.6, 0.75), c, 0.34) for c in centres]
+    crown = [blob(random, 210, (0.75, 0.6, 0.75), c, 0.34) for c in centres]
     return trunk, join(crown)
 
 
@@ -503,13 +500,13 @@ def ivy(random, count=1500):
 def furniture(scene, materials):
     """Benches by the fountain, barrels and crates by the east door."""
     slats = [box((-0.9, 0.42, z), (0.9, 0.47, z + 0.12), 1.0) for z in (-0.22, -0.06, 0.10)]
-    legs = [box((x, 0, -0.2), (x + 0.1, 0.42, 0.2), skip="yY") for x in (-0.75, 0.65)]
+    legs = [box((x, 0, -0.2), (x + 0.1, 0.42, 0.2), skip="y") for x in (-0.75, 0.65)]
     bench = scene.mesh("Bench", (join(slats), materials["wood"]), (join(legs), materials["limestone"]))
     for i, (x, z, turn) in enumerate([(-3.6, 0, 90), (3.6, 0.4, -90), (0, -3.7, 0)]):
         scene.node(f"Bench {i}", (x, 0, z), turn=turn, mesh=bench)
 
     staves = lathe([(0.24, 0), (0.31, 0.25), (0.33, 0.45), (0.31, 0.65), (0.24, 0.9)], 24)
-    lid = disc(0.24, 24, 0.88)
+    lid = disc(0.24, 24, 0.895)
     hoops = join(
         lathe([(r, y), (r, y + 0.05)], 24) for r, y in ((0.29, 0.12), (0.334, 0.34), (0.334, 0.52), (0.29, 0.73))
     )
@@ -531,7 +528,9 @@ def lanterns(scene, materials):
     bars = [
         box((x - 0.012, -0.2, z - 0.012), (x + 0.012, 0.2, z + 0.012)) for x in (-0.13, 0.13) for z in (-0.13, 0.13)
     ]
-    cap = lathe([(0.24, 0.2), (0.2, 0.24), (0.08, 0.36), (0.03, 0.4), (0.03, 0.46), (0.0, 0.48)], 4)
+    cap = lathe(
+        [(0.0, 0.2), (0.24, 0.2), (0.24, 0.2), (0.2, 0.24), (0.08, 0.36), (0.03, 0.4), (0.03, 0.46), (0.0, 0.48)], 4
+    )
     rim = join(
         [
             box((-0.15, -0.22, 0.11), (0.15, -0.2, 0.15)),
@@ -547,23 +546,37 @@ def lanterns(scene, materials):
     for name, x in (("west", -2.0), ("east", 6.0)):
         place = np.array([x, 2.9, -NORTH + 0.42])
         scene.node(f"Lantern {name}", place, mesh=lantern)
-        scene.lamp(f"Lamp {name}", place + [0, -0.02, 0], watts=160, colour=(1.0, 0.68, 0.36))
+        scene.lamp(f"Lamp {name}", place + [0, -0.02, 0], watts=60, colour=(1.0, 0.68, 0.36))
 
 
-# ---- camera
+# ---- sky and camera
+
+
+def sky(rows):
+    """An equirectangular summer sky, deep blue at the zenith and pale at the horizon, and warm ground below it.
+
+    The columns begin towards -x and go round over -z, +x and +z, as `scene.extras.buzz.world` has it.
+    """
+    y, x = np.mgrid[0:rows, 0 : 2 * rows] + 0.5
+    elevation, azimuth = np.pi / 2 - y / rows * np.pi, (x / rows - 1) * np.pi
+    blue = ramp(np.sin(np.clip(elevation, 0, None)) ** 0.6, (0.83, 0.90, 0.96), (0.55, 0.73, 0.93), (0.27, 0.48, 0.80))
+    # Clouds lie on a plane overhead that the eye sees foreshortened; the noise repeats, so any distance will do.
+    reach = 140 * np.cos(elevation) / (np.sin(np.clip(elevation, 0, None)) + 0.12)
+    column, row = (np.floor(reach * part).astype(int) % 512 for part in (np.cos(azimuth), np.sin(azimuth)))
+    cover = smoothstep(0.50, 0.72, noise(512, 4, seed=141, octaves=6))[row, column]
+    cover = 0.85 * cover * smoothstep(0.02, 0.30, elevation)
+    above = mix(blue, np.full_like(blue, 0.97), cover)
+    return mix(np.ones_like(above) * [0.50, 0.45, 0.38], above, smoothstep(-0.02, 0.0, elevation))
 
 
 def move_camera(scene):
     """The walk with its fast pan, and after the cut the low shot."""
     walk = np.arange(CUT)
     eyes = camera.spline({0: (0.9, 1.65, 7.0), 20: (2.0, 1.7, 5.6), 40: (2.4, 1.7, 4.4), 59: (1.7, 1.62, 3.3)}, walk)
-    # Azimuth and height of the view, in degrees; the pan swings by 88 degrees in 8 frames.
-    heading = camera.spline(
-        {0: (-14, 2.5), 16: (-11, 2.0), 34: (-4, 0.5), 38: (42, -1.5), 42: (84, -2.5), 52: (87, -2), 59: (87, -1.5)},
-        walk,
-    )
-    azimuth, height = np.radians(heading).T
-    ahead = np.column_stack([np.sin(azimuth) * np.cos(height), np.sin(height), -np.cos(azimuth) * np.cos(height)])
+    # In degrees: a slow drift to the right, and the fast pan from the fountain to the well.
+    pan = smoothstep(PAN[0], PAN[1], walk)
+    heading = -14 + 0.17 * walk + 87 * pan
+    pitch = 2.5 - 0.05 * walk - 1.5 * pan
 
     low = np.arange(FRAMES - CUT)
     low_eyes = camera.spline({0: (-4.6, 0.9, 3.4), 18: (-3.9, 1.15, 4.2), 35: (-2.9, 1.55, 4.8)}, low)
@@ -571,11 +584,11 @@ def move_camera(scene):
 
     scene.shots(
         [
-            ("Walk", eyes, camera.quaternions(camera.look_at(eyes, eyes + ahead))),
+            ("Walk", eyes, camera.quaternions(camera.look_along(heading, pitch))),
             ("Low", low_eyes, camera.quaternions(camera.look_at(low_eyes, targets))),
         ],
         yfov=np.radians(48),
         fps=24,
         resolution=(1280, 720),
-        world={"color": [0.36, 0.52, 0.80], "strength": 1.0},
+        world={"strength": 1.0, "image": scene.picture("sky", sky(256), step=1)},
     )

@@ -21,6 +21,7 @@ class Scene:
         self.name = name
         self.binary = bytearray()
         self.images = {}
+        self.stored = {}
         self.lights = []
         self.frames = 0
         self.document = {
@@ -42,10 +43,15 @@ class Scene:
 
     # ---- images and materials
 
-    def texture(self, name, image, levels=64):
-        """Adds a repeating, mip-mapped texture, saved as textures/<name>.png; returns its index."""
+    def picture(self, name, image, step=4):
+        """Adds the file textures/<name>.png; returns its URI."""
         uri = f"textures/{name}.png"
-        self.images[uri] = encode_png(image, levels)
+        self.images[uri] = encode_png(image, step)
+        return uri
+
+    def texture(self, name, image, step=4):
+        """Adds a picture as a repeating, mip-mapped texture; returns its index."""
+        uri = self.picture(name, image, step)
         if "samplers" not in self.document:
             linear_mipmap, linear, repeat = 9987, 9729, 10497
             self._add(
@@ -113,22 +119,31 @@ class Scene:
 
     def _primitive(self, surface, material):
         described = self.document["materials"][material]
+        textured = "normalTexture" in described or any("Texture" in k for k in described["pbrMetallicRoughness"])
+        layout = (textured, "normalTexture" in described)
+        # A surface that wears several materials is stored once; it is kept here so that its id stays its own.
+        key = (id(surface), layout)
+        if key not in self.stored:
+            self.stored[key] = (surface, self._geometry(surface, *layout))
+        return {**self.stored[key][1], "material": material}
+
+    def _geometry(self, surface, textured, bumpy):
         attributes = {
             "POSITION": self._accessor(surface.positions, "VEC3", FLOAT, ARRAY_BUFFER, bounds=True),
             "NORMAL": self._accessor(surface.normals, "VEC3", FLOAT, ARRAY_BUFFER),
         }
-        textured = "normalTexture" in described or any("Texture" in k for k in described["pbrMetallicRoughness"])
         if textured:
             attributes["TEXCOORD_0"] = self._accessor(surface.uvs, "VEC2", FLOAT, ARRAY_BUFFER)
-        if "normalTexture" in described:
+        if bumpy:
             attributes["TANGENT"] = self._accessor(surface.tangents(), "VEC4", FLOAT, ARRAY_BUFFER)
         index_type = USHORT if len(surface.positions) < 65535 else UINT
         indices = self._accessor(surface.triangles.reshape(-1), "SCALAR", index_type, ELEMENT_ARRAY_BUFFER)
-        return {"attributes": attributes, "indices": indices, "material": material}
+        return {"attributes": attributes, "indices": indices}
 
     def _accessor(self, values, kind, component, target=None, bounds=False):
         dtype = {FLOAT: "<f4", USHORT: "<u2", UINT: "<u4"}[component]
-        values = np.ascontiguousarray(values, dtype)
+        # Processors differ in the last bit of a sine; rounding keeps that out of the files.
+        values = np.ascontiguousarray(np.round(values, 7), dtype)
         self.binary.extend(b"\0" * (-len(self.binary) % 4))
         view = {"buffer": 0, "byteOffset": len(self.binary), "byteLength": values.nbytes}
         if target:
@@ -151,14 +166,14 @@ class Scene:
         """Adds a node to the scene, turned about Y by degrees or by a quaternion; `links` are mesh=, camera= ..."""
         node = {"name": name, **links}
         if any(translation):
-            node["translation"] = [float(t) for t in translation]
+            node["translation"] = _tidy(translation)
         if turn:
             half = np.radians(turn) / 2
             rotation = (0, np.sin(half), 0, np.cos(half))
         if rotation is not None:
-            node["rotation"] = [float(r) for r in rotation]
+            node["rotation"] = _tidy(rotation)
         if any(s != 1 for s in scale):
-            node["scale"] = [float(s) for s in scale]
+            node["scale"] = _tidy(scale)
         index = self._add("nodes", node)
         self.document["scenes"][0]["nodes"].append(index)
         return index
@@ -173,9 +188,19 @@ class Scene:
         light = {"type": "point", "intensity": LUMENS_PER_WATT * watts / (4 * np.pi)}
         self._light(name, light, colour, translation=position)
 
+    def spot(self, name, position, direction, watts, cone, colour=(1, 1, 1)):
+        """Adds a spot of so many watts, as Blender counts them, with inner and outer half-angles in degrees."""
+        light = {
+            "type": "spot",
+            "intensity": LUMENS_PER_WATT * watts / (4 * np.pi),
+            "spot": dict(zip(("innerConeAngle", "outerConeAngle"), _tidy(np.radians(cone)), strict=True)),
+        }
+        self._light(name, light, colour, translation=position, rotation=_turn_minus_z_to(direction))
+
     def _light(self, name, light, colour, **placing):
         self._require("KHR_lights_punctual")
-        self.lights.append({"name": name, "color": [float(c) for c in colour], **light})
+        light["intensity"] = round(light["intensity"], 3)
+        self.lights.append({"name": name, "color": _tidy(colour), **light})
         link = {"KHR_lights_punctual": {"light": len(self.lights) - 1}}
         self.node(name, extensions=link, **placing)
 
@@ -184,9 +209,9 @@ class Scene:
     def shots(self, shots, yfov, fps, resolution, world):
         """Adds a camera for each shot, and `scene.extras.buzz` that cuts from one to the next.
 
-        A shot is (camera name, positions, quaternions), one LINEAR key a frame; the shots follow each other from frame 0.
+        A shot is (camera name, positions, quaternions) with one LINEAR key a frame; the first begins at frame 0.
         """
-        lens = {"yfov": float(yfov), "znear": 0.05, "aspectRatio": resolution[0] / resolution[1]}
+        lens = {"yfov": round(float(yfov), 7), "znear": 0.05, "aspectRatio": resolution[0] / resolution[1]}
         samplers, channels, cuts = [], [], []
         for name, positions, rotations in shots:
             camera = self._add("cameras", {"type": "perspective", "name": name, "perspective": lens})
@@ -236,6 +261,11 @@ class Scene:
             target = Path(folder) / path
             target.parent.mkdir(parents=True, exist_ok=True)
             target.write_bytes(data)
+
+
+def _tidy(numbers):
+    """Plain numbers, rounded for the same reason as in `_accessor`."""
+    return [round(float(n), 7) for n in numbers]
 
 
 def _turn_minus_z_to(direction):

@@ -5,7 +5,7 @@ import sys
 from pathlib import Path
 
 #: Each name is a folder of `scenes/` and, with underscores, a module beside this file.
-SCENES = ("courtyard",)
+SCENES = ("courtyard", "gallery", "buzz-city")
 
 
 def build(name):

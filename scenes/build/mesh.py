@@ -128,18 +128,17 @@ def box(low, high, tile=1.0, skip=""):
     return join(polygon(corners, tile) for side, corners in sides.items() if side not in skip)
 
 
-def strip(left, right, tile=1.0, smooth=False, length=None):
+def strip(left, right, tile=1.0, smooth=False):
     """A band between two polylines of as many points; `smooth` shades it as one curved surface.
 
-    `length` gives each step's distance along the band for U where it is not that of the left line.
+    Seen from its front, with the lines running upwards, `left` is on the left.
     """
     left, right = np.asarray(left, float), np.asarray(right, float)
     if not smooth:
         pairs = zip(left[:-1], right[:-1], right[1:], left[1:], strict=True)
         return join(polygon(corners, tile) for corners in pairs)
-    if length is None:
-        steps = np.linalg.norm(np.diff(left, axis=0), axis=1)
-        length = np.concatenate([[0.0], np.cumsum(steps)])
+    steps = np.linalg.norm(np.diff(left, axis=0), axis=1)
+    length = np.concatenate([[0.0], np.cumsum(steps)])
     along = np.gradient(left, axis=0) + np.gradient(right, axis=0)
     normals = unit(np.cross(right - left, along))
     width = np.linalg.norm(right - left, axis=1)
@@ -238,10 +237,10 @@ def wall(width, height, openings, depth, tile=1.0):
                 cells.append(quad((x0, y0, 0), (x1, y0, 0), (x1, y1, 0), (x0, y1, 0), tile))
     for x0, y0, x1, y1 in openings:
         cells += [
-            quad((x0, y0, 0), (x0, y1, 0), (x0, y1, -depth), (x0, y0, -depth), tile),
-            quad((x1, y0, -depth), (x1, y1, -depth), (x1, y1, 0), (x1, y0, 0), tile),
-            quad((x0, y1, 0), (x1, y1, 0), (x1, y1, -depth), (x0, y1, -depth), tile),
-            quad((x0, y0, -depth), (x1, y0, -depth), (x1, y0, 0), (x0, y0, 0), tile),
+            quad((x0, y0, 0), (x0, y0, -depth), (x0, y1, -depth), (x0, y1, 0), tile),
+            quad((x1, y0, -depth), (x1, y0, 0), (x1, y1, 0), (x1, y1, -depth), tile),
+            quad((x0, y1, -depth), (x1, y1, -depth), (x1, y1, 0), (x0, y1, 0), tile),
+            quad((x0, y0, 0), (x1, y0, 0), (x1, y0, -depth), (x0, y0, -depth), tile),
         ]
     return join(cells)
 

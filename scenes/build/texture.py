@@ -43,7 +43,7 @@ def _value_noise(size, across, down, seed):
 
 
 def courses(size, rows, columns, seed, jitter=0.0):
-    """Masonry in courses, each shifted by half a stone: (distance to the nearest joint in tiles, a random tone a stone).
+    """Masonry in courses, each shifted by half a stone: (distance to the nearest joint in tiles, the stone's tone).
 
     `jitter` varies the widths of the stones, as a share of their mean width.
     """
@@ -85,13 +85,13 @@ def normal_map(height, strength):
     return normal / np.linalg.norm(normal, axis=-1, keepdims=True) * 0.5 + 0.5
 
 
-def encode_png(image, levels=64):
+def encode_png(image, step=4):
     """PNG bytes of an RGB or RGBA image.
 
-    The values are first rounded to `levels` steps: noise in the low bits is invisible but is most of a file's size.
+    The bytes are rounded to multiples of `step`: noise in the low bits is invisible but is most of a file's size. A
+    power of two keeps 128 as it is, which stands for "level" in normal maps.
     """
-    image = np.round(np.clip(image, 0, 1) * (levels - 1)) / (levels - 1)
-    pixels = np.round(image * 255).astype(np.uint8)
+    pixels = np.minimum(np.round(np.clip(image, 0, 1) * 255 / step) * step, 255).astype(np.uint8)
     height, width, channels = pixels.shape
     colour_type = {3: 2, 4: 6}[channels]
     header = struct.pack(">IIBBBBB", width, height, 8, colour_type, 0, 0, 0)

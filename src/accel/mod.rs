@@ -9,6 +9,7 @@
 //! at all when neither the origin nor an instance has moved.
 
 mod deform;
+mod displaced;
 mod intersect;
 mod opacity;
 mod tree;
@@ -18,6 +19,7 @@ mod wide;
 use crate::frame::SurfaceRef;
 use crate::scene::{Mesh, Pose, Scene};
 use deform::{Deformed, Shape, affine, is_deformable};
+pub use displaced::Displaced;
 use glam::{Affine3A, DAffine3, DVec3, Mat3A, Vec3, Vec3A, Vec4};
 pub use intersect::{RayHit, Sides};
 use rayon::prelude::*;

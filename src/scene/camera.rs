@@ -1,5 +1,6 @@
 //! Cameras, lenses, and the view of one frame: the mapping between pixels and the world.
 
+use crate::frame::Window;
 use glam::{DMat4, DVec2, DVec3, DVec4};
 
 /// A camera and the node that carries it. It looks along the node's -Z, +Y up.
@@ -111,6 +112,26 @@ impl View {
         DVec2::new(half_height * aspect, half_height)
     }
 
+    /// The part of this view that shows `window`, as a view of its own.
+    pub fn cropped(&self, window: Window) -> Self {
+        let full = DVec2::new(f64::from(self.width), f64::from(self.height));
+        let size = DVec2::new(f64::from(window.width), f64::from(window.height));
+        let corner = DVec2::new(f64::from(window.x), f64::from(window.y));
+        if size == full {
+            return *self;
+        }
+        let part = size / full;
+        // Normalised device coordinates of the window's centre.
+        let centre = ((corner + size * 0.5) / full * 2.0 - 1.0) * DVec2::new(1.0, -1.0);
+        let mut lens = self.lens;
+        lens.shift = (lens.shift + centre) / part;
+        match &mut lens.projection {
+            Projection::Perspective { yfov } => *yfov = 2.0 * ((*yfov * 0.5).tan() * part.y).atan(),
+            Projection::Orthographic { xmag, ymag } => (*xmag, *ymag) = (*xmag * part.x, *ymag * part.y),
+        }
+        Self { lens, width: window.width, height: window.height, ..*self }
+    }
+
     /// True for a pinhole camera.
     pub fn is_perspective(&self) -> bool {
         matches!(self.lens.projection, Projection::Perspective { .. })
@@ -205,6 +226,18 @@ mod tests {
                 assert!((r.x / r.w - x).abs() < 1e-9 && (r.y / r.w - y).abs() < 1e-9, "{projection:?} {r:?}");
                 assert!((r.z - 7.0).abs() < 1e-9);
             }
+        }
+    }
+
+    #[test]
+    fn a_window_shows_the_same_rays_as_the_whole() {
+        for projection in
+            [Projection::Perspective { yfov: 0.8 }, Projection::Orthographic { xmag: 2.0, ymag: 1.5 }]
+        {
+            let whole = view(projection);
+            let part = whole.cropped(Window { x: 100, y: 37, width: 64, height: 200 });
+            let (a, b) = (whole.ray(100.5 + 3.0, 37.5 + 150.0), part.ray(3.5, 150.5));
+            assert!((a.origin - b.origin).length() < 1e-12 && (a.direction - b.direction).length() < 1e-12);
         }
     }
 

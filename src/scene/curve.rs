@@ -51,6 +51,8 @@ pub enum Target {
     CameraNear(usize),
     /// Far clip distance of a camera.
     CameraFar(usize),
+    /// Shift of a camera's image window.
+    CameraShift(usize),
     /// Colour of a light.
     LightColor(usize),
     /// Intensity of a light, already radiometric.

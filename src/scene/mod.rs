@@ -8,6 +8,7 @@
 mod build;
 mod camera;
 mod curve;
+mod digest;
 mod light;
 mod material;
 mod mesh;

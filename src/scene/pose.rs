@@ -1,7 +1,7 @@
 //! The scene at one time: where every node, light and lens is.
 
 use super::{Camera, Curve, Lens, LightKind, PosedLight, Scene, Target, View};
-use glam::{DAffine3, DMat3, DQuat, DVec3, Vec3};
+use glam::{DAffine3, DMat3, DQuat, DVec2, DVec3, Vec3};
 
 /// A node's transform under its parent.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -93,6 +93,7 @@ impl Scene {
                 Target::CameraYmag(c) => lenses[c].set_ymag(v[0]),
                 Target::CameraNear(c) => lenses[c].near = v[0],
                 Target::CameraFar(c) => lenses[c].far = v[0],
+                Target::CameraShift(c) => lenses[c].shift = DVec2::from_slice(v),
                 Target::LightColor(l) => lights[l].color = Vec3::new(v[0] as f32, v[1] as f32, v[2] as f32),
                 Target::LightIntensity(l) => lights[l].intensity = v[0] as f32,
                 Target::LightRange(l) => lights[l].range = Some(v[0] as f32),
@@ -132,6 +133,28 @@ impl Scene {
         });
         let lights = lights.collect();
         Pose { world_from_node, visible, weights, lights, lenses }
+    }
+
+    /// The camera that frame `frame` is seen through: `chosen` if given, else the scene's cuts, else the first
+    /// animated camera, else the first.
+    ///
+    /// Before the first cut its camera is used already, as Blender does with markers.
+    pub fn camera_at(&self, frame: i64, chosen: Option<usize>) -> usize {
+        let by_cut = || {
+            let last = self.cuts.iter().rev().find(|c| c.frame <= frame);
+            last.or(self.cuts.first()).map(|c| c.camera)
+        };
+        chosen.or_else(by_cut).or_else(|| self.first_animated_camera()).unwrap_or(0)
+    }
+
+    fn first_animated_camera(&self) -> Option<usize> {
+        let moved = self.moved_nodes();
+        let zooms = |camera: usize| {
+            self.channels.iter().any(|c| {
+                matches!(c.target, Target::CameraYfov(i) | Target::CameraXmag(i) | Target::CameraYmag(i) if i == camera)
+            })
+        };
+        (0..self.cameras.len()).find(|&c| moved[self.cameras[c].node] || zooms(c))
     }
 
     /// What camera number `camera` sees in `pose`, on an image of `width` x `height` pixels.

@@ -47,9 +47,10 @@ impl Requirements {
                 | Target::LightRange(_)
                 | Target::LightInnerCone(_)
                 | Target::LightOuterCone(_) => needs.changing_lights = true,
-                Target::CameraYfov(_) | Target::CameraXmag(_) | Target::CameraYmag(_) => {
-                    needs.lens_change = true
-                }
+                Target::CameraYfov(_)
+                | Target::CameraXmag(_)
+                | Target::CameraYmag(_)
+                | Target::CameraShift(_) => needs.lens_change = true,
                 _ => {}
             }
         }

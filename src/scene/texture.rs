@@ -105,6 +105,18 @@ impl Image {
         (self.levels[0].width, self.levels[0].height)
     }
 
+    /// See [`super::Scene::digest`].
+    pub(super) fn digest(&self, feed: &mut dyn FnMut(&str, &[u8])) {
+        feed("image", format!("{} {:?}", self.name, self.size()).as_bytes());
+        match &self.texels {
+            Texels::Bytes(texels, space) => {
+                feed("space", format!("{space:?}").as_bytes());
+                feed("texels", texels.as_flattened());
+            }
+            Texels::Floats(texels) => feed("texels", bytemuck::cast_slice(texels)),
+        }
+    }
+
     /// Memory that the texels take.
     pub fn memory_bytes(&self) -> u64 {
         match &self.texels {

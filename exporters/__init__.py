@@ -1,0 +1,1 @@
+"""Exporters that carry camera moves from Blender and USD to glTF with nothing lost (see docs/extras.md)."""

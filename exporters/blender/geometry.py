@@ -1,0 +1,157 @@
+"""Meshes as rendered, and how they change shape; written by Blender's own glTF exporter.
+
+Every distinct evaluated mesh becomes one temporary object in a temporary scene, which `io_scene_gltf2` exports with its
+materials. A mesh that changes shape keeps its key poses (see common/morph.py) as shape keys, exported as morph targets.
+A mesh whose vertices or faces change in number becomes several meshes, each visible while it lasts.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from dataclasses import dataclass, field
+
+import bpy
+import numpy as np
+
+from ..common.morph import choose_targets
+from ..common.report import Lost
+from .prepare import is_animated
+
+
+@dataclass
+class Shape:
+    """One mesh topology with a copy of it in its first pose."""
+
+    name: str
+    mesh: bpy.types.Mesh
+    topology: bytes
+    # sample number -> vertex positions; empty for meshes that never change.
+    poses: dict[int, np.ndarray] = field(default_factory=dict)
+    mesh_index: int | None = None
+    weights: np.ndarray | None = None
+
+
+class GeometryStore:
+    """Hands out shape numbers; two objects with equal meshes and materials share one."""
+
+    def __init__(self, lost: Lost) -> None:
+        self.shapes: list[Shape] = []
+        self.lost = lost
+        self._by_content: dict[bytes, int] = {}
+        self._by_source: dict[tuple, list[int]] = {}
+        self._this_sample: dict[int, int] = {}
+
+    def begin_sample(self) -> None:
+        """Forget what was seen in the sample before."""
+        self._this_sample = {}
+
+    def shape_of(self, ob: bpy.types.Object, sample: int) -> int:
+        """The shape of an evaluated object at a sample; its pose is recorded where it may change."""
+        pointer = ob.data.as_pointer()
+        if pointer in self._this_sample and not _slots_of_object(ob):
+            return self._this_sample[pointer]
+        source = (ob.original.name_full, ob.data.name)
+        known = self._by_source.get(source)
+        changing = may_deform(ob)
+        if known and not changing:
+            return known[0]
+        if not known and not changing:
+            content = _content(ob)
+            if content not in self._by_content:
+                self._by_content[content] = self._new(ob, b"")
+            number = self._by_content[content]
+            self._by_source[source] = [number]
+        else:
+            topology = _topology(ob.data)
+            number = next((n for n in known or [] if self.shapes[n].topology == topology), -1)
+            if number < 0:
+                number = self._new(ob, topology)
+                self._by_source.setdefault(source, []).append(number)
+            self.shapes[number].poses[sample] = _positions(ob.data)
+        self._this_sample[pointer] = number
+        return number
+
+    def _new(self, ob: bpy.types.Object, topology: bytes) -> int:
+        # new_from_object() gives the mesh of the instancer for geometry-nodes instances; a copy of the evaluated data does not.
+        mesh = ob.data.copy()
+        for i, slot in enumerate(ob.material_slots):
+            if slot.link == "OBJECT" and i < max(len(mesh.materials), 1):
+                material = slot.material.original if slot.material else None
+                if i < len(mesh.materials):
+                    mesh.materials[i] = material
+                else:
+                    mesh.materials.append(material)
+        self.shapes.append(Shape(ob.original.data.name if ob.original.data else ob.name, mesh, topology))
+        return len(self.shapes) - 1
+
+    def build(self, scene: bpy.types.Scene, samples: np.ndarray) -> None:
+        """Link one object for each shape into `scene`, named by its number, with shape keys for its key poses.
+
+        `samples` are the frames of the samples in the order in which they were taken.
+        """
+        for number, shape in enumerate(self.shapes):
+            ob = bpy.data.objects.new(f"shape-{number}", shape.mesh)
+            shape.mesh.name = shape.name
+            scene.collection.objects.link(ob)
+            if len(shape.poses) > 1:
+                self._key_poses(ob, shape, samples)
+
+    def _key_poses(self, ob: bpy.types.Object, shape: Shape, samples: np.ndarray) -> None:
+        """Shape keys of the key poses, and the weights that bring each sample back."""
+        order = sorted(shape.poses, key=lambda n: samples[n])
+        poses = np.stack([shape.poses[n] for n in order])
+        times = samples[order]
+        chosen = choose_targets(poses, times, np.sort(samples))
+        if chosen is None:
+            return
+        numbers, shape.weights = chosen
+        shape.mesh.vertices.foreach_set("co", poses[0].reshape(-1))
+        ob.shape_key_add(name="Basis", from_mix=False)
+        for i, number in enumerate(numbers):
+            key = ob.shape_key_add(name=f"pose-{i}", from_mix=False)
+            key.data.foreach_set("co", poses[number].reshape(-1))
+            key.value = 0.0
+
+
+def may_deform(ob: bpy.types.Object) -> bool:
+    """Whether an evaluated object's mesh can differ from frame to frame."""
+    source = ob.original
+    data = source.data
+    if source.type != "MESH":
+        return source.type == "META" or is_animated(data) or bool(source.modifiers)
+    if source.modifiers or is_animated(data):
+        return True
+    return getattr(data, "shape_keys", None) is not None
+
+
+def _slots_of_object(ob: bpy.types.Object) -> bool:
+    return any(slot.link == "OBJECT" for slot in ob.material_slots)
+
+
+def _positions(mesh: bpy.types.Mesh) -> np.ndarray:
+    values = np.empty(len(mesh.vertices) * 3, dtype=np.float32)
+    mesh.vertices.foreach_get("co", values)
+    return values
+
+
+def _topology(mesh: bpy.types.Mesh) -> bytes:
+    """A digest of which vertices make which faces."""
+    corners = np.empty(len(mesh.loops), dtype=np.int32)
+    mesh.loops.foreach_get("vertex_index", corners)
+    starts = np.empty(len(mesh.polygons), dtype=np.int32)
+    mesh.polygons.foreach_get("loop_start", starts)
+    digest = hashlib.blake2b(corners.tobytes() + starts.tobytes(), digest_size=16)
+    digest.update(str(len(mesh.vertices)).encode())
+    return digest.digest()
+
+
+def _content(ob: bpy.types.Object) -> bytes:
+    """A digest of a mesh and its materials: equal ones are stored once."""
+    mesh = ob.data
+    digest = hashlib.blake2b(_topology(mesh) + _positions(mesh).tobytes(), digest_size=16)
+    names = [slot.material.name_full if slot.material else "" for slot in ob.material_slots]
+    names += [m.name_full if m else "" for m in mesh.materials]
+    digest.update(repr(names).encode())
+    # Shared data is the same in what is not looked at here (UV maps, colours, creases); different data may differ.
+    digest.update(ob.original.data.name_full.encode() if ob.original.data else b"")
+    return digest.digest()

@@ -1,0 +1,307 @@
+"""One export, from an open Blender scene to a glTF file: prepare, sample, write.
+
+The session is changed on the way (switches, temporary objects) and must be a throwaway one; the scripts open a file and
+never save it, and the operators in ui.py work on a copy in a background Blender.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import re
+import shutil
+import tempfile
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import bpy
+import numpy as np
+
+from ..common import extras, motion
+from ..common.document import Document
+from ..common.report import ExportError, InputError, Lost, OutputError
+from . import cameras, world
+from .bake import bake_procedural
+from .materials import prepare_materials
+from .prepare import prepare
+from .sample import InstanceTrack, Sampler
+
+_YUP_BACK = np.linalg.inv(cameras.YUP)
+
+
+@dataclass
+class Options:
+    """What to export; None means the scene's own setting."""
+
+    frames: tuple[int, int] | None = None
+    resolution: tuple[int, int] | None = None
+    camera: str | None = None
+    scene: str | None = None
+    bake: int = 1024
+    progress: Callable[[str], None] = lambda _line: None
+
+
+@dataclass
+class Result:
+    """What was written and what could not be carried."""
+
+    path: Path
+    lost: Lost
+    root: dict[str, Any]
+
+
+def export(path: Path, options: Options) -> Result:
+    """Export the open file's scene to `path` (.gltf or .glb)."""
+    path = Path(path).resolve()
+    if path.suffix not in (".gltf", ".glb"):
+        raise OutputError(f"{path}: the name must end in .gltf or .glb")
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        work = Path(tempfile.mkdtemp(prefix=".export-", dir=path.parent))
+    except OSError as error:
+        raise OutputError(f"{path.parent}: cannot be written ({error.strerror}); choose another output folder") from error
+    try:
+        return _Export(path, options, work).run()
+    finally:
+        shutil.rmtree(work, ignore_errors=True)
+
+
+class _Export:
+    def __init__(self, path: Path, options: Options, work: Path) -> None:
+        self.path, self.options, self.work = path, options, work
+        self.lost = Lost()
+        self.scene = _choose_scene(options.scene)
+        self.view_layer = next((v for v in self.scene.view_layers if v.use), self.scene.view_layers[0])
+        bpy.context.window.scene = self.scene
+        bpy.context.window.view_layer = self.view_layer
+        self.frames = options.frames or (self.scene.frame_start, self.scene.frame_end)
+        if self.frames[1] < self.frames[0]:
+            raise InputError(f"frame range {self.frames[0]}-{self.frames[1]}: the last frame is before the first")
+        render = self.scene.render
+        percent = render.resolution_percentage
+        # Blender truncates, BKE_render_resolution().
+        own = (max(render.resolution_x * percent // 100, 1), max(render.resolution_y * percent // 100, 1))
+        self.size = options.resolution or own
+
+    def run(self) -> Result:
+        """Do the whole job."""
+        prepare(self.scene, self.view_layer)
+        _name_scene_losses(self.scene, self.lost)
+        self.options.progress(f"sampling frames {self.frames[0]}-{self.frames[1]}")
+        sampler = Sampler(self.scene, self.view_layer, self.size, self.lost)
+        sky: list[tuple[float, ...]] = []
+        sampler.on_sample = lambda: sky.append(world.sample_world(self.scene))
+        sampler.run(*self.frames)
+        sky = [sky[i] for i in np.argsort(np.array(sampler.taken), kind="stable")]
+        self.scene.frame_set(self.frames[0])
+        self.options.progress(f"writing {len(sampler.geometry.shapes)} meshes")
+        document = self._geometry(sampler)
+        fps = extras.rational(self.scene.render.fps, self.scene.render.fps_base)
+        times = [(frame - self.frames[0]) * fps[1] / fps[0] for frame in sampler.frames]
+        animation = motion.Animation(document, times)
+        for track in sampler.instances.values():
+            self._instance(document, animation, sampler, track)
+        for light in sampler.lights.values():
+            light.write(document, animation, self.lost)
+        for camera in sampler.cameras:
+            camera.write(document, animation, self.lost)
+        surround = world.export_world(self.scene, self.path.parent, self.path.stem, self.lost)
+        if surround is not None:
+            world.animate_world(animation, sky, surround)
+        if not document.root.get("extensions", {}).get("KHR_lights_punctual") and _dark(surround):
+            self.lost.add(self.scene.name, "no light", "no light is visible in the render and the world is black; show a light, or only emission is seen")
+        animation.close()
+        self._finish(document, fps, self._cuts(sampler), surround)
+        return Result(self.path, self.lost, document.root)
+
+    def _geometry(self, sampler: Sampler) -> Document:
+        """Have Blender's exporter write the meshes and materials; a document without nodes."""
+        shapes = sampler.geometry.shapes
+        temporary = bpy.data.scenes.new("export")
+        bpy.context.window.scene = temporary
+        sampler.geometry.build(temporary, np.array(sampler.taken))
+        if self.options.bake:
+            bake_procedural(temporary, self.options.bake, self.options.progress)
+        slots = [slot.material for ob in temporary.collection.objects for slot in ob.material_slots]
+        prepare_materials([m for m in dict.fromkeys(slots) if m is not None], self.lost)
+        separate = self.path.suffix == ".gltf"
+        target = self.work / f"{self.path.stem}{self.path.suffix}"
+        if shapes:
+            _call_exporter(target, separate, f"{self.path.stem}_textures")
+            document = Document.load(target)
+        else:
+            document = Document()
+        bpy.context.window.scene = self.scene
+        self._collect(document, sampler)
+        textures = self.work / f"{self.path.stem}_textures"
+        if textures.is_dir() and any(textures.iterdir()):
+            shutil.rmtree(self.path.parent / textures.name, ignore_errors=True)
+            shutil.move(textures, self.path.parent / textures.name)
+        return document
+
+    def _collect(self, document: Document, sampler: Sampler) -> None:
+        """Read back which mesh each shape became, and drop the nodes."""
+        for node in document.root.pop("nodes", []):
+            match = re.fullmatch(r"shape-(\d+)", node.get("name", ""))
+            if match and "mesh" in node:
+                shape = sampler.geometry.shapes[int(match[1])]
+                shape.mesh_index = node["mesh"]
+                # Blender numbers copies (.001); the file gets the artist's name back.
+                document.root["meshes"][node["mesh"]]["name"] = shape.name
+        for key in ("scenes", "scene", "animations", "skins", "cameras"):
+            document.root.pop(key, None)
+        for mesh in document.root.get("meshes", []):
+            mesh.pop("extras", None)
+        used = [e for e in document.root.get("extensionsUsed", []) if e != "KHR_lights_punctual"]
+        document.root["extensionsUsed"] = used
+        document.root.pop("extensionsRequired", None)
+
+    def _instance(self, document: Document, animation: motion.Animation, sampler: Sampler, track: InstanceTrack) -> None:
+        """One node for each shape an instance takes, visible while it takes it."""
+        visible = np.array(track.visible)
+        numbers = np.array(track.shapes)
+        poses = cameras.YUP @ np.array(track.poses) @ _YUP_BACK
+        for number in dict.fromkeys(track.shapes):
+            shape = sampler.geometry.shapes[number]
+            shown = visible & (numbers == number)
+            if not shown.any():
+                continue
+            if shape.mesh_index is None:
+                self.lost.add(track.name, "object without faces", "only faces are rendered; give the curve a bevel or the edges a surface")
+                continue
+            node: dict = {"name": track.name, "mesh": shape.mesh_index}
+            if motion.is_sheared(poses):
+                upper, lower = motion.split_sheared(poses)
+                parent: dict = {"name": f"{track.name} (sheared)"}
+                above = document.append("nodes", parent)
+                index = document.append("nodes", node)
+                parent["children"] = [index]
+                animation.node(parent, above, upper)
+                animation.node(node, index, lower)
+            else:
+                index = document.append("nodes", node)
+                animation.node(node, index, poses)
+            animation.visibility(node, index, shown)
+            if shape.weights is not None:
+                animation.weights(index, shape.weights)
+
+    def _cuts(self, sampler: Sampler) -> list[dict[str, Any]]:
+        """Which camera is seen when: the one asked for, the markers', or the scene's."""
+        nodes = {track.source.name: track.node for track in sampler.cameras}
+        first, last = self.frames
+        if self.options.camera is not None:
+            if self.options.camera not in nodes:
+                have = ", ".join(sorted(nodes)) or "none"
+                raise InputError(f"camera {self.options.camera!r}: not in scene {self.scene.name!r}; it has {have}")
+            bound = [(first, self.options.camera)]
+        else:
+            bound = [(frame, ob.name) for frame, ob in cameras.marker_cuts(self.scene)]
+            if not bound and self.scene.camera is not None:
+                bound = [(first, self.scene.camera.name)]
+        cuts = [{"frame": frame, "camera": name, "node": nodes[name]} for frame, name in bound if name in nodes]
+        if not cuts:
+            self.lost.add(self.scene.name, "no camera", "add a camera to the scene, or convert with --turntable")
+        return extras.simplify_cuts(cuts, first, last)
+
+    def _finish(self, document: Document, fps: tuple[int, int], cuts: list[dict], surround: dict | None) -> None:
+        """Scene, extras, check, save."""
+        render = self.scene.render
+        nodes = document.root.get("nodes", [])
+        below = {child for node in nodes for child in node.get("children", [])}
+        document.root["scenes"] = [{"name": self.scene.name, "nodes": [i for i in range(len(nodes)) if i not in below]}]
+        document.root["scene"] = 0
+        document.root["scenes"][0]["extras"] = {
+            "buzz": extras.scene_extras(
+                generator="Buzz exporter for Blender",
+                application=f"Blender {bpy.app.version_string}",
+                file=bpy.data.filepath,
+                fps=fps,
+                frames=self.frames,
+                resolution=self.size,
+                pixel_aspect=render.pixel_aspect_x / render.pixel_aspect_y,
+                shutter=render.motion_blur_shutter if render.use_motion_blur else None,
+                cuts=cuts,
+                world=surround,
+                lost=self.lost,
+            )
+        }
+        if not document.root["scenes"][0]["nodes"]:
+            document.root["scenes"][0].pop("nodes")
+        extras.check(document.root)
+        document.save(self.path)
+
+
+def _dark(surround: dict | None) -> bool:
+    """Whether a world sheds no light (an animated one may later)."""
+    return surround is None or "image" not in surround and (surround["strength"] == 0 or not any(surround["color"]))
+
+
+def _choose_scene(name: str | None) -> bpy.types.Scene:
+    if name is None:
+        return bpy.context.scene
+    if name not in bpy.data.scenes:
+        raise InputError(f"scene {name!r}: the file has {', '.join(s.name for s in bpy.data.scenes)}")
+    return bpy.data.scenes[name]
+
+
+def _call_exporter(path: Path, separate: bool, textures: str) -> None:
+    """Blender's glTF exporter on the current scene, geometry and materials only."""
+    wanted = {
+        "export_format": "GLTF_SEPARATE" if separate else "GLB",
+        "export_texture_dir": textures,
+        "export_animations": False,
+        "export_morph": True,
+        "export_morph_normal": True,
+        "export_morph_animation": False,
+        "export_try_sparse_sk": False,
+        "export_skins": False,
+        "export_lights": False,
+        "export_cameras": False,
+        "export_extras": True,
+        "export_apply": False,
+        "export_gpu_instances": False,
+        "use_active_scene": True,
+    }
+    # Options come and go between 4.2 and 5.x; those left out here have the values wanted by default.
+    known = bpy.ops.export_scene.gltf.get_rna_type().properties.keys()
+    log = io.StringIO()
+    try:
+        with contextlib.redirect_stdout(log), contextlib.redirect_stderr(log):
+            bpy.ops.export_scene.gltf(filepath=str(path), **{k: v for k, v in wanted.items() if k in known})
+    except RuntimeError as error:
+        lines = [line.strip() for line in str(error).splitlines() if line.strip() and not line.startswith("Location")]
+        last = next((line for line in reversed(lines) if "Error" in line), lines[-1])
+        mesh = re.findall(r"Extracting primitive: (.*)", log.getvalue())
+        where = f" at mesh {mesh[-1]!r}" if mesh else ""
+        raise ExportError(f"Blender's glTF exporter failed{where}: {last}; hide that object from the render, or simplify it") from None
+
+
+def _name_scene_losses(scene: bpy.types.Scene, lost: Lost) -> None:
+    """Things of the whole scene that a picture made from the glTF will not have."""
+    render = scene.render
+    if render.frame_map_old != render.frame_map_new:
+        lost.add(scene.name, "time stretching", "set Time Stretching back and scale the keys instead")
+    if render.use_motion_blur:
+        lost.add(scene.name, "motion blur", "it is not rendered; use the motion vectors (--aov motion) in compositing")
+    if render.use_border:
+        lost.add(scene.name, "render region", "the whole picture is rendered; pass --crop to buzz-convert")
+    if render.use_multiview:
+        lost.add(scene.name, "stereoscopy", "pass --stereo and --convergence to buzz-convert")
+    if scene.frame_step != 1:
+        lost.add(scene.name, f"frame step {scene.frame_step}", f"pass --frames {scene.frame_start}-{scene.frame_end}x{scene.frame_step} to buzz-convert")
+    for camera in {m.camera for m in scene.timeline_markers if m.camera} | {scene.camera}:
+        if camera is not None and camera.type == "CAMERA" and camera.data.dof.use_dof:
+            lost.add(camera.name, "depth of field", "it is not rendered; use depth.Z in compositing")
+    for ob in scene.objects:
+        if ob.hide_render:
+            continue
+        for flag, label in (("is_holdout", "holdout"), ("is_shadow_catcher", "shadow catcher")):
+            if ob.type == "MESH" and getattr(ob, flag, False):
+                lost.add(ob.name, label, "it is rendered as an ordinary object; use its objectId in compositing")
+        if ob.type == "MESH" and not getattr(ob, "visible_camera", True):
+            lost.add(ob.name, "hidden from camera rays", "it is seen here; hide it from the render or leave it out")
+        for system in ob.particle_systems:
+            if system.settings.type == "HAIR" and system.settings.render_type == "PATH":
+                lost.add(ob.name, "hair", "it is left out; convert it to a mesh first (Object > Convert)")

@@ -1,0 +1,105 @@
+"""Make the viewport's evaluation equal to the render's.
+
+Blender's Python (and its glTF exporter) sees the viewport's dependency graph. A render differs: other modifiers are on,
+subdivision goes deeper, objects hidden in the viewport are there. The exporter works on a throwaway session (a copy of
+the user's file), so the switches are simply set to what the render would use.
+"""
+
+from __future__ import annotations
+
+import bpy
+
+# (viewport, render) pairs of properties that modifiers, curves, metaballs and particle settings have.
+_LEVELS = (("levels", "render_levels"), ("screw_steps", "render_steps"), ("steps", "render_steps"))
+
+
+def prepare(scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer) -> None:
+    """Set everything that differs between viewport and render to the render's value."""
+    _leave_edit_mode(view_layer)
+    if scene.render.use_simplify:
+        scene.render.simplify_subdivision = scene.render.simplify_subdivision_render
+        scene.render.simplify_child_particles = scene.render.simplify_child_particles_render
+    for collection in bpy.data.collections:
+        if not collection.library:
+            collection.hide_viewport = False
+    _show_layers(view_layer.layer_collection)
+    for ob in bpy.data.objects:
+        _unmute(ob, "hide_viewport")
+        ob.hide_viewport = False
+        ob.show_instancer_for_viewport = ob.show_instancer_for_render
+        for modifier in ob.modifiers:
+            _as_rendered(modifier)
+        for system in ob.particle_systems:
+            _particles(system.settings)
+    for ob in view_layer.objects:
+        ob.hide_set(False, view_layer=view_layer)
+    for curve in bpy.data.curves:
+        if curve.render_resolution_u:
+            curve.resolution_u = curve.render_resolution_u
+        if curve.render_resolution_v:
+            curve.resolution_v = curve.render_resolution_v
+    for ball in bpy.data.metaballs:
+        ball.resolution = ball.render_resolution
+    view_layer.update()
+
+
+def _leave_edit_mode(view_layer: bpy.types.ViewLayer) -> None:
+    """A file saved while a mesh was being edited opens in edit mode, where the evaluated mesh has no attributes."""
+    active = view_layer.objects.active
+    for ob in view_layer.objects:
+        if ob.mode != "OBJECT":
+            view_layer.objects.active = ob
+            bpy.ops.object.mode_set(mode="OBJECT")
+    view_layer.objects.active = active
+
+
+def _show_layers(layer: bpy.types.LayerCollection) -> None:
+    layer.hide_viewport = False
+    for child in layer.children:
+        _show_layers(child)
+
+
+def _unmute(ob: bpy.types.Object, path: str) -> None:
+    """Take the animation off a property that is about to be set."""
+    data = ob.animation_data
+    if data is None:
+        return
+    for driver in data.drivers:
+        if driver.data_path == path:
+            driver.mute = True
+    for curve in action_curves(ob):
+        if curve.data_path == path:
+            curve.mute = True
+
+
+def _as_rendered(modifier: bpy.types.Modifier) -> None:
+    modifier.show_viewport = modifier.show_render
+    for viewport, render in _LEVELS:
+        if hasattr(modifier, viewport) and hasattr(modifier, render):
+            setattr(modifier, viewport, getattr(modifier, render))
+
+
+def _particles(settings: bpy.types.ParticleSettings) -> None:
+    settings.display_percentage = 100
+    settings.child_percent = settings.rendered_child_count
+    settings.display_step = settings.render_step
+
+
+def action_curves(owner: bpy.types.ID) -> list[bpy.types.FCurve]:
+    """The F-curves of a datablock's action, in the old (4.x) and the slotted (5.x) form."""
+    data = owner.animation_data
+    action = data.action if data else None
+    if action is None:
+        return []
+    if hasattr(action, "fcurves"):
+        return list(action.fcurves)
+    from bpy_extras.anim_utils import action_get_channelbag_for_slot
+
+    bag = action_get_channelbag_for_slot(action, data.action_slot)
+    return list(bag.fcurves) if bag else []
+
+
+def is_animated(owner: bpy.types.ID | None) -> bool:
+    """Whether a datablock has an action, NLA strips or drivers of its own."""
+    data = getattr(owner, "animation_data", None)
+    return data is not None and bool(data.action or data.drivers or any(t.strips for t in data.nla_tracks))

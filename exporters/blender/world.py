@@ -1,0 +1,162 @@
+"""The world: a plain colour, an environment image, or anything else rendered into an image by Cycles.
+
+Blender's equirectangular convention is the one docs/extras.md states (its +X is glTF's +X and the image's centre).
+"""
+
+from __future__ import annotations
+
+import math
+import shutil
+from pathlib import Path
+from typing import Any
+
+import bpy
+import numpy as np
+
+from ..common.extras import tidy
+from ..common.motion import Animation
+from ..common.report import Lost
+from .prepare import is_animated
+
+_READABLE = {".hdr", ".exr", ".png", ".jpg", ".jpeg"}
+_BAKED_WIDTH = 1024
+
+
+def export_world(scene: bpy.types.Scene, folder: Path, stem: str, lost: Lost) -> dict[str, Any] | None:
+    """The value of `extras.buzz.world`; an image is put into `folder`."""
+    world = scene.world
+    if world is None:
+        return {"color": [0, 0, 0], "strength": 1}
+    tree = world.node_tree if world.use_nodes else None
+    if tree is None:
+        return {"color": [tidy(c) for c in world.color], "strength": 1}
+    output = next((n for n in tree.nodes if n.type == "OUTPUT_WORLD" and n.is_active_output), None)
+    if output is None or not output.inputs["Surface"].is_linked:
+        return {"color": [0, 0, 0], "strength": 1}
+    if output.inputs["Volume"].is_linked:
+        lost.add(world.name, "world volume", "render the mist in compositing, from depth.Z")
+    background = output.inputs["Surface"].links[0].from_node
+    if background.type == "BACKGROUND" and not background.inputs["Strength"].is_linked:
+        strength = max(float(background.inputs["Strength"].default_value), 0.0)
+        colour = background.inputs["Color"]
+        if not colour.is_linked:
+            return {"color": [tidy(max(c, 0)) for c in colour.default_value[:3]], "strength": tidy(strength)}
+        image = _environment(colour.links[0].from_node)
+        if image is not None:
+            uri = _put_image(image[0], folder, stem)
+            if uri is None:
+                lost.add(world.name, f"image {image[0].name!r} is missing", "find it with File > External Data > Find Missing Files; the world is black")
+                return {"color": [0, 0, 0], "strength": 1}
+            return {"color": [1, 1, 1], "strength": tidy(strength), "image": uri, "rotation": tidy(image[1])}
+    if is_animated(tree):
+        lost.add(world.name, "animated world nodes", "the sky of the first frame is used; animate only colour and strength of a Background node")
+    return {"color": [1, 1, 1], "strength": 1, "image": _bake(scene, folder, stem), "rotation": 0}
+
+
+def animate_world(animation: Animation, samples: list[tuple[float, ...]], world: dict[str, Any]) -> None:
+    """Channels for the colour and strength of a plain background that change."""
+    values = np.array(samples)
+    if "image" not in world:
+        animation.pointer("/scenes/0/extras/buzz/world/color", np.maximum(values[:, :3], 0))
+    animation.pointer("/scenes/0/extras/buzz/world/strength", np.maximum(values[:, 3], 0))
+
+
+def sample_world(scene: bpy.types.Scene) -> tuple[float, ...]:
+    """Colour and strength of the Background node now."""
+    world = scene.world
+    tree = world.node_tree if world is not None and world.use_nodes else None
+    node = next((n for n in tree.nodes if n.type == "BACKGROUND"), None) if tree else None
+    if node is None:
+        return (*(world.color if world else (0, 0, 0)), 1.0)
+    return (*node.inputs["Color"].default_value[:3], node.inputs["Strength"].default_value)
+
+
+def _environment(node: bpy.types.Node) -> tuple[bpy.types.Image, float] | None:
+    """Image and rotation of an equirectangular Environment Texture turned about the vertical at most, else None."""
+    if node.type != "TEX_ENVIRONMENT" or node.image is None or node.projection != "EQUIRECTANGULAR":
+        return None
+    if node.image.source not in ("FILE", "GENERATED"):
+        return None
+    vector = node.inputs["Vector"]
+    if not vector.is_linked:
+        return node.image, 0.0
+    mapping = vector.links[0].from_node
+    if mapping.type != "MAPPING":
+        plain = mapping.type == "TEX_COORD" and vector.links[0].from_socket.name == "Generated"
+        return (node.image, 0.0) if plain else None
+    if any(mapping.inputs[n].is_linked for n in ("Location", "Rotation", "Scale") if n in mapping.inputs):
+        return None
+    source = mapping.inputs["Vector"]
+    if source.is_linked and (source.links[0].from_node.type != "TEX_COORD" or source.links[0].from_socket.name != "Generated"):
+        return None
+    location = mapping.inputs["Location"].default_value if "Location" in mapping.inputs else (0, 0, 0)
+    rotation, scale = mapping.inputs["Rotation"].default_value, mapping.inputs["Scale"].default_value
+    turned = max(abs(rotation[0]), abs(rotation[1])) > 1e-6
+    if turned or max(abs(x) for x in location) > 1e-6 or max(abs(x - 1) for x in scale) > 1e-6:
+        return None
+    # A Point mapping turns the direction that is looked up, so the sky turns the other way.
+    return node.image, (rotation[2] if mapping.vector_type == "TEXTURE" else -rotation[2])
+
+
+def _put_image(image: bpy.types.Image, folder: Path, stem: str) -> str | None:
+    """Copy or write the environment image beside the glTF; its file name. None if it has no pixels."""
+    # Asking for the size makes Blender load the file, and only then does it know its colour space.
+    _ = image.size[0]
+    suffix = Path(image.filepath_raw or image.name).suffix.lower()
+    linear = image.colorspace_settings.name.startswith(("Linear", "scene_linear"))
+    eight_bit = suffix in (".png", ".jpg", ".jpeg")
+    source = Path(bpy.path.abspath(image.filepath_raw, library=image.library)) if image.filepath_raw else None
+    missing = image.source == "FILE" and not image.packed_file and not (source and source.is_file())
+    if missing or not image.size[0]:
+        return None
+    if image.source == "FILE" and suffix in _READABLE and eight_bit != linear:
+        target = folder / f"{stem}_world{suffix}"
+        if image.packed_file:
+            target.write_bytes(image.packed_file.data)
+            return target.name
+        if source and source.is_file():
+            shutil.copyfile(source, target)
+            return target.name
+    # Anything else (generated, other formats, unusual colour spaces): the pixels, linear, as OpenEXR.
+    target = folder / f"{stem}_world.exr"
+    width, height = image.size
+    copy = bpy.data.images.new("world", width, height, float_buffer=True)
+    copy.colorspace_settings.name = "Linear Rec.709" if bpy.app.version >= (4, 0, 0) else "Linear"
+    pixels = np.empty(width * height * 4, dtype=np.float32)
+    image.pixels.foreach_get(pixels)
+    if not linear and not image.is_float:
+        rgb = pixels.reshape(-1, 4)[:, :3]
+        rgb[:] = np.where(rgb <= 0.04045, rgb / 12.92, ((rgb + 0.055) / 1.055) ** 2.4)
+    copy.pixels.foreach_set(pixels)
+    copy.filepath_raw, copy.file_format = str(target), "OPEN_EXR"
+    copy.save()
+    bpy.data.images.remove(copy)
+    return target.name
+
+
+def _bake(scene: bpy.types.Scene, folder: Path, stem: str) -> str:
+    """Render the world alone with Cycles through an equirectangular camera; the file name of the image."""
+    target = folder / f"{stem}_world.exr"
+    sky = bpy.data.scenes.new("world")
+    sky.world = scene.world
+    data = bpy.data.cameras.new("world")
+    data.type = "PANO"
+    # The property moved from Cycles' own settings to the camera in Blender 5.0.
+    panorama = data if hasattr(data, "panorama_type") else data.cycles
+    panorama.panorama_type = "EQUIRECTANGULAR"
+    camera = bpy.data.objects.new("world", data)
+    # Looking along Blender's +X, upright: the image's centre is then where the convention has it.
+    camera.rotation_euler = (math.pi / 2, 0, -math.pi / 2)
+    sky.collection.objects.link(camera)
+    sky.camera = camera
+    sky.render.engine = "CYCLES"
+    sky.cycles.samples, sky.cycles.use_denoising, sky.cycles.pixel_filter_type = 1, False, "BOX"
+    sky.render.resolution_x, sky.render.resolution_y, sky.render.resolution_percentage = _BAKED_WIDTH, _BAKED_WIDTH // 2, 100
+    sky.render.filter_size = 0.01
+    sky.render.image_settings.file_format = "OPEN_EXR"
+    sky.render.image_settings.color_depth = "16"
+    sky.render.filepath = str(target)
+    sky.frame_set(scene.frame_current)
+    bpy.ops.render.render(write_still=True, scene=sky.name)
+    bpy.data.scenes.remove(sky)
+    return target.name

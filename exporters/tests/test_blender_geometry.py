@@ -1,0 +1,334 @@
+"""Geometry, transforms and materials against what Blender evaluates."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+
+def world_points(gltf, node, frame):
+    """Sorted world vertices of a node."""
+    points = gltf.triangles(node).reshape(-1, 3)
+    m = gltf.world(node, frame)
+    return np.unique(np.round(points @ m[:3, :3].T + m[:3, 3], 4), axis=0)
+
+
+def blender_points(ob, depsgraph):
+    """Sorted evaluated world vertices in glTF axes."""
+    import blender_scene as b
+
+    evaluated = ob.evaluated_get(depsgraph)
+    m = b.YUP @ np.array(evaluated.matrix_world)
+    points = np.array([v.co for v in evaluated.data.vertices])
+    return np.unique(np.round(points @ m[:3, :3].T + m[:3, 3], 4) + 0.0, axis=0)
+
+
+def test_parents_and_constraints(blender, export):
+    import blender_scene as b
+
+    blender.context.scene.frame_end = 4
+    b.camera()
+    parent = b.cube("Parent")
+    child = b.cube("Child", location=(3, 0, 0))
+    child.parent = parent
+    copy = b.cube("Copy", location=(0, 0, 3)).constraints.new("COPY_ROTATION")
+    copy.target = parent
+    b.key(parent, "rotation_euler", {1: (0, 0, 0), 4: (0.3, 0.2, 1.0)})
+    gltf = export()
+    for name in ("Parent", "Child", "Copy"):
+        for frame in range(1, 5):
+            depsgraph = b.set_frame(frame)
+            want = blender_points(blender.data.objects[name], depsgraph)
+            np.testing.assert_allclose(world_points(gltf, gltf.node(name), frame), want, atol=2e-4)
+
+
+def test_shear_from_uneven_parents(blender, export):
+    import blender_scene as b
+
+    blender.context.scene.frame_end = 4
+    b.camera()
+    parent = b.link(blender.data.objects.new("Squash", None))
+    parent.scale = (3, 1, 0.4)
+    child = b.cube("Child")
+    child.parent = parent
+    b.key(child, "rotation_euler", {1: (0, 0.2, 0.3), 4: (0.6, 0.5, 1.2)})
+    gltf = export()
+    for frame in range(1, 5):
+        depsgraph = b.set_frame(frame)
+        np.testing.assert_allclose(world_points(gltf, gltf.node("Child"), frame), blender_points(child, depsgraph), atol=3e-4)
+
+
+def test_mirrored_object(blender, export):
+    import blender_scene as b
+
+    b.camera()
+    ob = b.cube("Mirrored")
+    ob.scale = (-1, 2, 1)
+    gltf = export()
+    assert np.linalg.det(gltf.world(gltf.node("Mirrored"), 1)[:3, :3]) == pytest.approx(-2)
+
+
+def test_render_modifiers_not_viewport_ones(blender, export):
+    import blender_scene as b
+
+    b.camera()
+    ob = b.cube("Smooth")
+    subsurf = ob.modifiers.new("s", "SUBSURF")
+    subsurf.levels, subsurf.render_levels = 0, 2
+    off = ob.modifiers.new("a", "ARRAY")
+    off.show_render = False
+    gltf = export()
+    assert len(gltf.triangles(gltf.node("Smooth"))) == 6 * 16 * 2
+
+
+def test_shape_keys(blender, export):
+    import blender_scene as b
+
+    blender.context.scene.frame_end = 5
+    b.camera()
+    ob = b.cube("Morph")
+    ob.shape_key_add(name="Basis")
+    up = ob.shape_key_add(name="Up")
+    for point in up.data:
+        point.co.z += 1.0
+    b.key(up, "value", {1: 0.0, 3: 0.5, 5: 1.0}, interpolation="BEZIER")
+    gltf = export()
+    node = gltf.node("Morph")
+    assert len(gltf.root["meshes"][gltf.root["nodes"][node]["mesh"]]["weights"]) == 1, "a straight line needs one target"
+    for frame, shift in ((1, 0.0), (3, 0.5), (5, 1.0)):
+        assert gltf.posed_points(node, frame)[:, 1].max() == pytest.approx(1 + shift, abs=1e-4)
+
+
+def test_armature(blender, export):
+    """A bent bone: deformation is carried pose by pose."""
+    import blender_scene as b
+
+    blender.context.scene.frame_end = 5
+    b.camera()
+    data = blender.data.armatures.new("Rig")
+    rig = b.link(blender.data.objects.new("Rig", data))
+    blender.context.view_layer.objects.active = rig
+    blender.ops.object.mode_set(mode="EDIT")
+    bone = data.edit_bones.new("Bone")
+    bone.head, bone.tail = (0, 0, 0), (0, 0, 1)
+    blender.ops.object.mode_set(mode="OBJECT")
+    ob = b.cube("Skin")
+    ob.vertex_groups.new(name="Bone").add(range(4), 1.0, "REPLACE")
+    ob.modifiers.new("Armature", "ARMATURE").object = rig
+    pose = rig.pose.bones["Bone"]
+    pose.rotation_mode = "XYZ"
+    for frame, angle in ((1, 0.0), (5, 1.0)):
+        pose.rotation_euler = (0, angle, 0)
+        pose.keyframe_insert("rotation_euler", frame=frame)
+    gltf = export()
+    node = gltf.node("Skin")
+    for frame in (2, 5):
+        depsgraph = b.set_frame(frame)
+        got = np.unique(np.round(gltf.posed_points(node, frame), 3) + 0.0, axis=0)
+        want = np.unique(np.round(blender_points(ob, depsgraph), 3) + 0.0, axis=0)
+        np.testing.assert_allclose(got, want, atol=2e-3)
+
+
+def test_changing_topology(blender, export):
+    """An animated Build modifier: as many meshes as it has states, each visible in its frames."""
+    import blender_scene as b
+
+    blender.context.scene.frame_end = 4
+    b.camera()
+    ob = b.cube("Growing")
+    array = ob.modifiers.new("a", "ARRAY")
+    b.key(array, "count", {1: 1, 4: 4})
+    gltf = export()
+    nodes = [i for i, n in enumerate(gltf.root["nodes"]) if n["name"] == "Growing"]
+    assert len(nodes) == 4
+    for frame in range(1, 5):
+        seen = [n for n in nodes if gltf.visible(n, frame)]
+        assert [len(gltf.triangles(n)) for n in seen] == [12 * frame]
+
+
+def test_collection_instances(blender, export):
+    import blender_scene as b
+
+    blender.context.scene.frame_end = 3
+    b.camera()
+    source = blender.data.collections.new("Tree")
+    ob = b.cube("Leaf", location=(1, 0, 0))
+    blender.context.scene.collection.objects.unlink(ob)
+    source.objects.link(ob)
+    for i in range(3):
+        empty = b.link(blender.data.objects.new(f"Tree.{i}", None))
+        empty.instance_type, empty.instance_collection = "COLLECTION", source
+        empty.location = (0, 3 * i, 0)
+    b.key(empty, "location", {1: (0, 6, 0), 3: (0, 9, 0)})
+    gltf = export()
+    nodes = [i for i, n in enumerate(gltf.root["nodes"]) if n["name"] == "Leaf"]
+    assert len({gltf.root["nodes"][n]["mesh"] for n in nodes}) == 1, "instances share their mesh"
+    assert sorted(round(-gltf.world(n, 3)[2, 3], 4) for n in nodes) == [0, 3, 9]
+
+
+def scatter(blender, name: str, size: float):
+    """A plane with a small ball on each corner, by geometry nodes."""
+    import blender_scene as b
+
+    ob = b.plane(name, size=size)
+    tree = blender.data.node_groups.new(name, "GeometryNodeTree")
+    tree.interface.new_socket("Geometry", in_out="INPUT", socket_type="NodeSocketGeometry")
+    tree.interface.new_socket("Geometry", in_out="OUTPUT", socket_type="NodeSocketGeometry")
+    start, end = tree.nodes.new("NodeGroupInput"), tree.nodes.new("NodeGroupOutput")
+    points, ball = tree.nodes.new("GeometryNodeInstanceOnPoints"), tree.nodes.new("GeometryNodeMeshIcoSphere")
+    tree.links.new(start.outputs[0], points.inputs["Points"])
+    tree.links.new(ball.outputs["Mesh"], points.inputs["Instance"])
+    tree.links.new(points.outputs[0], end.inputs[0])
+    ob.modifiers.new("g", "NODES").node_group = tree
+
+
+def test_geometry_nodes_instances(blender, export):
+    import blender_scene as b
+
+    b.camera()
+    scatter(blender, "Scatter", 4)
+    gltf = export()
+    nodes = [i for i, n in enumerate(gltf.root["nodes"]) if n["name"] == "Scatter"]
+    places = sorted(tuple(np.round(gltf.world(n, 1)[[0, 2], 3], 4)) for n in nodes)
+    assert places == [(-2, -2), (-2, 2), (2, -2), (2, 2)]
+    assert all(len(gltf.triangles(n)) == 20 for n in nodes)
+
+
+def test_metaballs_text_and_bevelled_curves_are_meshes(blender, export):
+    import blender_scene as b
+
+    b.camera()
+    ball = blender.data.metaballs.new("Ball")
+    ball.elements.new()
+    b.link(blender.data.objects.new("Ball", ball))
+    text = blender.data.curves.new("Text", "FONT")
+    text.body = "buzz"
+    b.link(blender.data.objects.new("Text", text))
+    curve = blender.data.curves.new("Tube", "CURVE")
+    curve.dimensions, curve.bevel_depth = "3D", 0.1
+    curve.splines.new("POLY").points.add(2)
+    for i, point in enumerate(curve.splines[0].points):
+        point.co = (i, 0, 0, 1)
+    b.link(blender.data.objects.new("Tube", curve))
+    gltf = export()
+    for name in ("Ball", "Text", "Tube"):
+        assert len(gltf.triangles(gltf.node(name))) > 20, name
+
+
+def test_volumes_and_wires_are_named(blender, export):
+    import blender_scene as b
+
+    b.camera()
+    b.link(blender.data.objects.new("Smoke", blender.data.volumes.new("Smoke")))
+    data = blender.data.meshes.new("Wire")
+    data.from_pydata([(0, 0, 0), (1, 0, 0)], [(0, 1)], [])
+    b.link(blender.data.objects.new("Wire", data))
+    gltf = export()
+    assert gltf.lost_features("Smoke") == ["volume"]
+    assert gltf.lost_features("Wire") == ["object without faces"]
+    assert next(i for i in gltf.buzz["lost"] if i["object"] == "Smoke")["action"]
+
+
+def test_procedural_colour_is_baked(blender, export):
+    import blender_scene as b
+
+    b.camera()
+    ob = b.plane("Checked")
+    made, shader = b.material()
+    checker = made.node_tree.nodes.new("ShaderNodeTexChecker")
+    checker.inputs["Color1"].default_value = (1, 0, 0, 1)
+    checker.inputs["Color2"].default_value = (0, 0, 1, 1)
+    made.node_tree.links.new(checker.outputs["Color"], shader.inputs["Base Color"])
+    ob.data.materials.append(made)
+    gltf = export(bake=64)
+    assert "baseColorTexture" in gltf.root["materials"][0]["pbrMetallicRoughness"]
+    assert not gltf.lost_features("Grey")
+    path = gltf.path.parent / gltf.root["images"][0]["uri"]
+    image = blender.data.images.load(str(path))
+    pixels = np.array(image.pixels).reshape(-1, 4)
+    assert (pixels[:, 0] > 0.9).sum() > 500
+    assert (pixels[:, 2] > 0.9).sum() > 500
+
+
+def test_procedural_colour_is_named_without_baking(blender, export):
+    import blender_scene as b
+
+    b.camera()
+    ob = b.plane("Noisy")
+    made, shader = b.material()
+    noise = made.node_tree.nodes.new("ShaderNodeTexNoise")
+    made.node_tree.links.new(noise.outputs["Color"], shader.inputs["Base Color"])
+    ob.data.materials.append(made)
+    assert export(bake=0).lost_features("Grey") == ["procedural base color (noise node)"]
+
+
+@pytest.mark.parametrize(("shader", "check"), [
+    ("ShaderNodeBsdfDiffuse", lambda m: m["pbrMetallicRoughness"]["baseColorFactor"][:3] == pytest.approx([0.1, 0.2, 0.3], abs=1e-6)),
+    ("ShaderNodeBsdfAnisotropic", lambda m: m["pbrMetallicRoughness"].get("metallicFactor", 1) == 1),
+    ("ShaderNodeBsdfGlass", lambda m: m["extensions"]["KHR_materials_transmission"]["transmissionFactor"] == 1),
+])  # fmt: skip
+def test_plain_shaders_become_principled(blender, export, shader, check):
+    import blender_scene as b
+
+    b.camera()
+    ob = b.cube()
+    made, _old = b.material()
+    tree = made.node_tree
+    new = tree.nodes.new(shader)
+    new.inputs["Color"].default_value = (0.1, 0.2, 0.3, 1)
+    output = tree.get_output_node("ALL")
+    tree.links.new(new.outputs[0], output.inputs["Surface"])
+    ob.data.materials.append(made)
+    assert check(export().root["materials"][0])
+
+
+def test_mixed_shaders_are_named(blender, export):
+    import blender_scene as b
+
+    b.camera()
+    ob = b.cube()
+    made, _ = b.material()
+    tree = made.node_tree
+    mix = tree.nodes.new("ShaderNodeMixShader")
+    tree.links.new(mix.outputs[0], tree.get_output_node("ALL").inputs["Surface"])
+    ob.data.materials.append(made)
+    assert export().lost_features("Grey") == ["Mix Shader shader"]
+
+
+def test_materials_of_slots_of_the_object(blender, export):
+    import blender_scene as b
+
+    b.camera()
+    first, second = b.material("Red", (1, 0, 0))[0], b.material("Blue", (0, 0, 1))[0]
+    a = b.cube("A")
+    a.data.materials.append(first)
+    other = b.link(blender.data.objects.new("B", a.data))
+    other.location = (3, 0, 0)
+    other.material_slots[0].link, other.material_slots[0].material = "OBJECT", second
+    gltf = export()
+    used = {}
+    for name in ("A", "B"):
+        mesh = gltf.root["meshes"][gltf.root["nodes"][gltf.node(name)]["mesh"]]
+        used[name] = gltf.root["materials"][mesh["primitives"][0]["material"]]["name"]
+    assert used == {"A": "Red", "B": "Blue"}
+
+
+def test_particles(blender, export):
+    import blender_scene as b
+
+    blender.context.scene.frame_end = 6
+    b.camera()
+    emitter = b.plane("Emitter", size=2)
+    drop = b.cube("Drop", size=0.1)
+    drop.hide_render = True
+    emitter.modifiers.new("p", "PARTICLE_SYSTEM")
+    settings = emitter.particle_systems[0].settings
+    settings.count, settings.frame_start, settings.frame_end, settings.lifetime = 10, 1, 3, 50
+    settings.render_type, settings.instance_object = "OBJECT", drop
+    gltf = export()
+    nodes = [i for i, n in enumerate(gltf.root["nodes"]) if n["name"] == "Drop"]
+    assert len(nodes) == 10
+    assert any(gltf.animated((n, "translation")) for n in nodes)
+    assert math.isfinite(gltf.world(nodes[0], 6).sum())

@@ -1,0 +1,121 @@
+"""Lights: kinds, units, colour temperature, animation, areas."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+
+def make(blender, kind, **settings):
+    import blender_scene as b
+
+    b.camera()
+    return b.light(kind, **settings)
+
+
+def test_point(blender, export):
+    make(blender, "POINT", energy=100.0, color=(1, 0.5, 0.25), shadow_soft_size=0.3)
+    _, light = export().light("Light")
+    assert light["type"] == "point"
+    assert light["intensity"] == pytest.approx(683 * 100 / (4 * math.pi))
+    assert light["color"] == pytest.approx([1, 0.5, 0.25])
+    assert light["extras"]["radius"] == pytest.approx(0.3)
+
+
+def test_spot(blender, export):
+    make(blender, "SPOT", energy=50.0, spot_size=1.2, spot_blend=0.25)
+    _, light = export().light("Light")
+    assert light["intensity"] == pytest.approx(683 * 50 / (4 * math.pi))
+    assert light["spot"]["outerConeAngle"] == pytest.approx(0.6)
+    # Cycles: full strength where cos(theta) >= cos(half) + (1 - cos(half)) * blend.
+    assert math.cos(light["spot"]["innerConeAngle"]) == pytest.approx(math.cos(0.6) + (1 - math.cos(0.6)) * 0.25)
+
+
+def test_sun(blender, export):
+    make(blender, "SUN", energy=3.0, angle=0.02)
+    _, light = export().light("Light")
+    assert (light["type"], light["intensity"]) == ("directional", pytest.approx(683 * 3))
+    assert light["extras"]["angle"] == pytest.approx(0.02)
+
+
+@pytest.mark.parametrize(
+    ("settings", "shape", "size"),
+    [
+        ({"shape": "SQUARE", "size": 2.0}, "rectangle", [4, 6]),
+        ({"shape": "RECTANGLE", "size": 2.0, "size_y": 0.5}, "rectangle", [4, 1.5]),
+        ({"shape": "DISK", "size": 1.0}, "ellipse", [2, 3]),
+        ({"shape": "ELLIPSE", "size": 1.0, "size_y": 2.0}, "ellipse", [2, 6]),
+    ],
+)
+def test_area(blender, export, settings, shape, size):
+    ob = make(blender, "AREA", energy=40.0)
+    for key, value in settings.items():
+        setattr(ob.data, key, value)
+    ob.scale = (2, 3, 1)
+    _, light = export().light("Light")
+    assert light["type"] == "spot"
+    assert light["spot"] == {"innerConeAngle": 0, "outerConeAngle": pytest.approx(math.pi / 2)}
+    assert light["intensity"] == pytest.approx(683 * 40 / math.pi)
+    assert light["extras"]["area"]["shape"] == shape
+    assert light["extras"]["area"]["size"] == pytest.approx(size)
+
+
+def test_temperature_and_exposure(blender, export):
+    ob = make(blender, "POINT", energy=10.0, color=(0.5, 0.5, 0.5))
+    if not hasattr(ob.data, "use_temperature"):
+        pytest.skip("this Blender has no light temperature")
+    ob.data.use_temperature, ob.data.temperature = True, 3000.0
+    if hasattr(ob.data, "exposure"):
+        ob.data.exposure = 2.0
+    want = np.array(ob.data.temperature_color) * 0.5 * 10 * (4 if hasattr(ob.data, "exposure") else 1) * 683 / (4 * math.pi)
+    _, light = export().light("Light")
+    np.testing.assert_allclose(np.array(light["color"]) * light["intensity"], want, rtol=1e-5)
+    assert max(light["color"]) <= 1
+
+
+def test_not_normalized_lights_do_not_stop_the_export(blender, export):
+    ob = make(blender, "AREA", energy=10.0, size=2.0)
+    if not hasattr(ob.data, "normalize"):
+        pytest.skip("this Blender always normalises lights")
+    ob.data.normalize = False
+    _, light = export().light("Light")
+    assert light["intensity"] == pytest.approx(683 * 10 / math.pi * 4)
+
+
+def test_animation(blender, export):
+    import blender_scene as b
+
+    blender.context.scene.frame_end = 5
+    ob = make(blender, "SPOT", energy=10.0)
+    b.key(ob.data, "energy", {1: 10.0, 5: 50.0})
+    b.key(ob.data, "color", {1: (1, 1, 1), 5: (1, 0, 0)})
+    b.key(ob.data, "spot_size", {1: 1.0, 5: 0.5})
+    b.key(ob.data, "shadow_soft_size", {1: 0.0, 5: 0.4})
+    b.key(ob, "location", {1: (0, 0, 5), 5: (1, 0, 5)})
+    gltf = export()
+    assert gltf.light_value("Light", "intensity", 3, 0.0) == pytest.approx(683 * 30 / (4 * math.pi), rel=1e-5)
+    assert gltf.light_value("Light", "color", 3, [0, 0, 0]) == pytest.approx([1, 0.5, 0.5], rel=1e-5)
+    assert gltf.light_value("Light", "spot/outerConeAngle", 5, 0.0) == pytest.approx(0.25, rel=1e-5)
+    assert gltf.light_value("Light", "extras/radius", 3, 0.0) == pytest.approx(0.2, rel=1e-5)
+    np.testing.assert_allclose(gltf.world(gltf.node("Light"), 5)[:3, 3], (1, 5, 0), atol=1e-6)
+
+
+def test_hidden_and_blinking_lights(blender, export):
+    import blender_scene as b
+
+    blender.context.scene.frame_end = 3
+    make(blender, "POINT", name="Off").hide_render = True
+    blink = b.light("POINT", "Blink")
+    b.key(blink, "hide_render", {1: False, 2: True}, interpolation="CONSTANT")
+    gltf = export()
+    assert [gltf.visible(gltf.node("Blink"), f) for f in (1, 2, 3)] == [True, False, False]
+    assert all(n["name"] != "Off" for n in gltf.root["nodes"])
+
+
+def test_what_a_light_loses_is_named(blender, export):
+    ob = make(blender, "AREA", spread=1.0)
+    ob.data.use_shadow = False
+    features = export().lost_features("Light")
+    assert {"area light spread", "light without shadows"} <= set(features)

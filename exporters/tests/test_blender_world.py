@@ -1,0 +1,156 @@
+"""The world: colour, image, rotation, and anything else baked by Cycles. Directions as docs/extras.md states them."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+# One pixel column of a different colour each: u = (i + 0.5) / 8.
+COLOURS = np.array([[i / 8, 1 - i / 8, (i % 2)] for i in range(8)], dtype=np.float32)
+
+
+def world(blender):
+    """A world with nodes; its Background node and tree."""
+    made = blender.data.worlds.new("World")
+    if made.node_tree is None:
+        made.use_nodes = True
+    blender.context.scene.world = made
+    import blender_scene as b
+
+    b.camera()
+    return made.node_tree.nodes["Background"], made.node_tree
+
+
+def environment(blender, tree, background, tmp_path, suffix=".exr"):
+    """An environment texture of eight columns, saved in a file."""
+    image = blender.data.images.new("sky", 64, 32, float_buffer=suffix != ".png")
+    if suffix != ".png":
+        image.colorspace_settings.name = "Linear Rec.709"
+    pixels = np.ones((32, 8, 8, 4), dtype=np.float32)
+    pixels[..., :3] = COLOURS[None, :, None]
+    image.pixels.foreach_set(pixels.reshape(-1))
+    image.filepath_raw = str(tmp_path / f"sky{suffix}")
+    image.file_format = {".exr": "OPEN_EXR", ".hdr": "HDR", ".png": "PNG"}[suffix]
+    image.save()
+    node = tree.nodes.new("ShaderNodeTexEnvironment")
+    node.image = blender.data.images.load(image.filepath_raw)
+    tree.links.new(node.outputs["Color"], background.inputs["Color"])
+    return node
+
+
+def test_no_world_is_black(blender, export):
+    import blender_scene as b
+
+    b.camera()
+    assert export().buzz["world"]["color"] == [0, 0, 0]
+
+
+def test_colour_and_strength(blender, export):
+    background, _ = world(blender)
+    background.inputs["Color"].default_value = (0.1, 0.2, 0.3, 1)
+    background.inputs["Strength"].default_value = 2.5
+    assert export().buzz["world"] == {"color": pytest.approx([0.1, 0.2, 0.3]), "strength": 2.5}
+
+
+@pytest.mark.parametrize("suffix", [".exr", ".hdr", ".png"])
+def test_image_file_is_copied(blender, export, tmp_path, suffix):
+    background, tree = world(blender)
+    environment(blender, tree, background, tmp_path, suffix)
+    gltf = export()
+    assert gltf.buzz["world"]["image"] == f"anim_world{suffix}"
+    if suffix != ".exr":
+        # Blender marks the EXR files that it saves itself as sRGB-encoded; those are written anew, linear.
+        assert (gltf.path.parent / gltf.buzz["world"]["image"]).read_bytes() == (tmp_path / f"sky{suffix}").read_bytes()
+    assert gltf.buzz["world"]["rotation"] == 0
+
+
+@pytest.mark.parametrize(("kind", "sign"), [("POINT", -1), ("TEXTURE", 1)])
+def test_mapping_becomes_a_rotation(blender, export, tmp_path, kind, sign):
+    background, tree = world(blender)
+    node = environment(blender, tree, background, tmp_path)
+    mapping, where = tree.nodes.new("ShaderNodeMapping"), tree.nodes.new("ShaderNodeTexCoord")
+    mapping.vector_type = kind
+    mapping.inputs["Rotation"].default_value = (0, 0, 0.7)
+    tree.links.new(where.outputs["Generated"], mapping.inputs["Vector"])
+    tree.links.new(mapping.outputs["Vector"], node.inputs["Vector"])
+    assert export().buzz["world"]["rotation"] == pytest.approx(sign * 0.7)
+
+
+def look_up(path, blender, direction, rotation):
+    """The radiance that docs/extras.md gives a direction (glTF axes)."""
+    image = blender.data.images.load(str(path))
+    width, height = image.size
+    pixels = np.array(image.pixels).reshape(height, width, 4)
+    x, y, z = direction
+    # Turned by -rotation about +Y.
+    c, s = math.cos(rotation), math.sin(rotation)
+    x, z = c * x - s * z, s * x + c * z
+    u, v = 0.5 + math.atan2(z, x) / (2 * math.pi), 0.5 - math.asin(y) / math.pi
+    return pixels[min(int((1 - v) * height), height - 1), min(int(u * width), width - 1), :3]
+
+
+@pytest.mark.parametrize("rotated", [False, True])
+def test_directions_agree_with_cycles(blender, export, tmp_path, rotated):
+    """What Cycles shows through a camera is what the convention says; the same for a baked sky."""
+    background, tree = world(blender)
+    node = environment(blender, tree, background, tmp_path)
+    mapping, where = tree.nodes.new("ShaderNodeMapping"), tree.nodes.new("ShaderNodeTexCoord")
+    mapping.inputs["Rotation"].default_value = (0, 0, 0.3 if rotated else 0.0)
+    tree.links.new(where.outputs["Generated"], mapping.inputs["Vector"])
+    tree.links.new(mapping.outputs["Vector"], node.inputs["Vector"])
+    seen = cycles_colours(blender, tmp_path)
+    gltf = export()
+    for turn, want in seen.items():
+        direction = (math.sin(turn), 0.0, -math.cos(turn))
+        got = look_up(gltf.path.parent / gltf.buzz["world"]["image"], blender, direction, gltf.buzz["world"]["rotation"])
+        np.testing.assert_allclose(got, want, atol=0.02)
+    # A Gamma node is beyond a plain image: the sky is baked, and must look the same.
+    gamma = tree.nodes.new("ShaderNodeGamma")
+    tree.links.new(node.outputs["Color"], gamma.inputs["Color"])
+    tree.links.new(gamma.outputs["Color"], background.inputs["Color"])
+    gltf = export("baked.gltf")
+    assert gltf.buzz["world"]["image"] == "baked_world.exr"
+    for turn, want in seen.items():
+        direction = (math.sin(turn), 0.0, -math.cos(turn))
+        got = look_up(gltf.path.parent / "baked_world.exr", blender, direction, 0.0)
+        np.testing.assert_allclose(got, want, atol=0.02)
+
+
+def cycles_colours(blender, tmp_path) -> dict[float, np.ndarray]:
+    """The middle pixel of Cycles renders in four level directions; keys: clockwise turns from Blender's +Y."""
+    scene = blender.context.scene
+    scene.render.engine = "CYCLES"
+    scene.cycles.samples, scene.cycles.use_denoising = 1, False
+    scene.render.resolution_x = scene.render.resolution_y = 9
+    scene.render.image_settings.file_format = "OPEN_EXR"
+    out = {}
+    for turn in (0.2, 1.7, 3.3, 4.8):
+        scene.camera.rotation_euler = (math.pi / 2, 0, -turn)
+        scene.camera.data.angle = 0.02
+        scene.render.filepath = str(tmp_path / "look.exr")
+        blender.ops.render.render(write_still=True)
+        image = blender.data.images.load(scene.render.filepath, check_existing=False)
+        out[turn] = np.array(image.pixels).reshape(9, 9, 4)[4, 4, :3]
+        blender.data.images.remove(image)
+    return out
+
+
+def test_animated_strength(blender, export):
+    import blender_scene as b
+
+    blender.context.scene.frame_end = 3
+    background, _ = world(blender)
+    b.key(background.inputs["Strength"], "default_value", {1: 0.0, 3: 2.0})
+    gltf = export()
+    assert gltf.value("/scenes/0/extras/buzz/world/strength", 2, 0.0) == pytest.approx(1.0)
+
+
+def test_missing_image_is_named(blender, export, tmp_path):
+    background, tree = world(blender)
+    image = environment(blender, tree, background, tmp_path).image
+    image.filepath = str(tmp_path / "gone.exr")
+    image.reload()
+    gltf = export()
+    assert any("is missing" in feature for feature in gltf.lost_features("World"))

@@ -1,0 +1,174 @@
+"""UsdLux lights by the formulas of docs/extras.md; domes; the command line."""
+
+from __future__ import annotations
+
+import math
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+pytest.importorskip("pxr", reason="SKIPPED LOUDLY: usd-core is not installed (pip install usd-core)")
+import usd_scene as u
+from PIL import Image
+from pxr import UsdGeom, UsdLux
+
+SCRIPT = Path(__file__).resolve().parents[1] / "usd" / "usd_to_gltf.py"
+
+
+def light(made, kind, **inputs):
+    """A light with inputs."""
+    prim = made.DefinePrim("/World/Light", kind)
+    for name, value in inputs.items():
+        prim.GetAttribute(f"inputs:{name}").Set(value)
+    return prim
+
+
+# Kind, inputs, metres per unit, candela or lux, over 683.
+CASES = [
+    ("SphereLight", {"intensity": 10.0, "radius": 0.5}, 1.0, 10 * math.pi * 0.25),
+    ("SphereLight", {"intensity": 10.0, "radius": 50.0}, 0.01, 10 * math.pi * 0.25),
+    ("SphereLight", {"intensity": 10.0, "radius": 0.5, "normalize": True}, 1.0, 10 / 4),
+    ("SphereLight", {"intensity": 10.0, "radius": 50.0, "normalize": True}, 0.01, 10 / 4 * 1e-4),
+    ("RectLight", {"intensity": 3.0, "width": 2.0, "height": 0.5, "exposure": 2.0}, 1.0, 12.0),
+    ("RectLight", {"intensity": 3.0, "width": 2.0, "height": 0.5, "normalize": True}, 1.0, 3.0),
+    ("DiskLight", {"intensity": 3.0, "radius": 2.0}, 1.0, 3 * math.pi * 4),
+    ("DistantLight", {"intensity": 5.0, "angle": 2.0}, 1.0, 5 * math.pi * math.sin(math.radians(1)) ** 2),
+    ("DistantLight", {"intensity": 5.0, "angle": 2.0, "normalize": True}, 1.0, 5.0),
+    ("DistantLight", {"intensity": 5.0, "angle": 0.0}, 1.0, 5.0),
+]
+
+
+@pytest.mark.parametrize(("kind", "inputs", "units", "want"), CASES)
+def test_intensities(usd_convert, kind, inputs, units, want):
+    made = u.stage(units=units)
+    u.camera(made)
+    light(made, kind, **inputs)
+    _, data = usd_convert(made).light("Light")
+    assert data["intensity"] == pytest.approx(683 * want, rel=1e-5)
+
+
+def test_shapes_and_directions(usd_convert):
+    made = u.stage("Z", 0.01)
+    u.camera(made)
+    prim = light(made, "RectLight", width=200.0, height=100.0)
+    UsdGeom.XformCommonAPI(prim).SetTranslate((0, 0, 300))
+    UsdGeom.XformCommonAPI(prim).SetScale((2, 1, 1))
+    gltf = usd_convert(made)
+    _, data = gltf.light("Light")
+    assert data["extras"]["area"] == {"shape": "rectangle", "size": pytest.approx([4, 1])}
+    world = gltf.world(gltf.node("Light"), 1)
+    np.testing.assert_allclose(world[:3, 3], (0, 3, 0), atol=1e-6)
+    np.testing.assert_allclose(-world[:3, 2], (0, -1, 0), atol=1e-6)
+    assert np.linalg.norm(world[:3, 0]) == pytest.approx(1)
+
+
+def test_temperature_and_cone(usd_convert):
+    made = u.stage()
+    u.camera(made)
+    prim = light(made, "SphereLight", enableColorTemperature=True, colorTemperature=3000.0)
+    shaping = UsdLux.ShapingAPI.Apply(prim)
+    shaping.CreateShapingConeAngleAttr(30.0)
+    shaping.CreateShapingConeSoftnessAttr(0.5)
+    _, data = usd_convert(made).light("Light")
+    warm = np.array(UsdLux.BlackbodyTemperatureAsRgb(3000.0))
+    np.testing.assert_allclose(data["color"], warm / warm.max(), rtol=1e-5)
+    assert data["type"] == "spot"
+    assert data["spot"]["outerConeAngle"] == pytest.approx(math.radians(30))
+    assert data["spot"]["innerConeAngle"] == pytest.approx(math.radians(15))
+
+
+def test_animated_and_hidden(usd_convert):
+    made = u.stage()
+    u.camera(made)
+    prim = light(made, "SphereLight", radius=1.0)
+    for frame in (1, 5):
+        prim.GetAttribute("inputs:intensity").Set(float(frame), frame)
+    UsdGeom.Imageable(prim).CreateVisibilityAttr().Set("inherited", 1)
+    UsdGeom.Imageable(prim).GetVisibilityAttr().Set("invisible", 4)
+    gltf = usd_convert(made)
+    assert gltf.light_value("Light", "intensity", 3, 0.0) == pytest.approx(683 * math.pi * 3, rel=1e-5)
+    assert [gltf.visible(gltf.node("Light"), f) for f in (3, 4)] == [True, False]
+
+
+@pytest.mark.parametrize(
+    ("kind", "feature"), [("CylinderLight", "cylinder light"), ("GeometryLight", "GeometryLight light"), ("PortalLight", "PortalLight light")]
+)
+def test_other_lights_are_named(usd_convert, kind, feature):
+    made = u.stage()
+    u.camera(made)
+    light(made, kind)
+    assert feature in usd_convert(made).lost_features("/World/Light")
+
+
+@pytest.mark.parametrize("turn", [0.0, 40.0])
+def test_dome(usd_convert, tmp_path, turn):
+    """The image's centre is seen along the dome's +Z (OpenEXR); a quarter to its left is +X."""
+    Image.new("RGB", (8, 4), (10, 20, 30)).save(tmp_path / "sky.png")
+    made = u.stage()
+    u.camera(made)
+    prim = light(made, "DomeLight", intensity=2.0, exposure=1.0)
+    UsdLux.DomeLight(prim).CreateTextureFileAttr("sky.png")
+    UsdGeom.XformCommonAPI(prim).SetRotate((0, turn, 0))
+    world = usd_convert(made).buzz["world"]
+    assert (world["strength"], world["color"]) == (4, [1, 1, 1])
+    a = math.radians(turn)
+    for local, u_want in (((0, 0, 1), 0.5), ((1, 0, 0), 0.25), ((-1, 0, 0), 0.75)):
+        x, z = local[0] * math.cos(a) + local[2] * math.sin(a), -local[0] * math.sin(a) + local[2] * math.cos(a)
+        # docs/extras.md: turn by -rotation about +Y, then u = 0.5 + atan2(z, x) / 2 pi.
+        c, s = math.cos(world["rotation"]), math.sin(world["rotation"])
+        x, z = c * x - s * z, s * x + c * z
+        assert 0.5 + math.atan2(z, x) / (2 * math.pi) == pytest.approx(u_want, abs=1e-5)
+
+
+def test_plain_dome_and_second_dome(usd_convert):
+    made = u.stage()
+    u.camera(made)
+    light(made, "DomeLight", intensity=0.5, color=(0.2, 0.4, 0.8))
+    made.DefinePrim("/World/More", "DomeLight")
+    gltf = usd_convert(made)
+    assert np.array(gltf.buzz["world"]["color"]) * gltf.buzz["world"]["strength"] == pytest.approx([0.1, 0.2, 0.4])
+    assert gltf.lost_features("/World/More") == ["second dome light"]
+
+
+@pytest.mark.parametrize(
+    ("content", "arguments", "code", "words"),
+    [
+        (None, [], 3, "no such file"),
+        ("not usd at all", [], 3, "not a USD stage"),
+        ("#usda 1.0\n", ["--variant", "a=b"], 3, "has it"),
+        ("#usda 1.0\n", ["--variant", "a"], 2, "SET=VALUE"),
+        ("#usda 1.0\n", ["--camera", "/Nobody"], 3, "the stage has none"),
+        ("#usda 1.0\n", ["--frames", "5-1"], 3, "before the first"),
+    ],
+)
+def test_command_line(tmp_path, content, arguments, code, words):
+    if content is not None:
+        (tmp_path / "s.usda").write_text(content)
+    command = [sys.executable, str(SCRIPT), str(tmp_path / "s.usda"), str(tmp_path / "o.gltf"), *arguments]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=60, check=False)
+    assert done.returncode == code, done.stderr
+    assert words in done.stderr
+    assert "Traceback" not in done.stderr
+
+
+def test_empty_stage_converts(tmp_path):
+    (tmp_path / "s.usda").write_text("#usda 1.0\n")
+    done = subprocess.run([sys.executable, str(SCRIPT), str(tmp_path / "s.usda"), str(tmp_path / "o.glb")], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    assert "no camera" in done.stderr
+
+
+def test_stage_without_lights_is_lit_from_the_camera(usd_convert):
+    made = u.stage()
+    prim = u.camera(made)
+    for frame in (1, 5):
+        UsdGeom.XformCommonAPI(prim).SetRotate((0, 10.0 * frame, 0), UsdGeom.XformCommonAPI.RotationOrderXYZ, frame)
+    gltf = usd_convert(made)
+    node = gltf.node("camera light")
+    np.testing.assert_allclose(gltf.world(node, 4), gltf.world(gltf.camera_at(4), 4), atol=1e-6)
+    assert gltf.lost_features("stage.usda") == ["no lights"]
+    dark = usd_convert(made, camera_light=False)
+    assert "KHR_lights_punctual" not in dark.root.get("extensions", {})

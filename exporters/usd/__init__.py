@@ -1,0 +1,1 @@
+"""The USD side: any stage that usd-core opens, to glTF."""

@@ -1,0 +1,386 @@
+"""One conversion: a USD stage to a glTF file."""
+
+from __future__ import annotations
+
+import json
+import math
+import re
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+from urllib.parse import quote
+
+import numpy as np
+import pygltflib
+from pxr import Tf, Usd, UsdGeom, UsdRender, UsdSkel, UsdUtils
+
+from ..common import extras, motion
+from ..common.document import Document, write_whole
+from ..common.report import InputError, Lost, OutputError
+from .cameras import CameraTrack
+from .lights import LightTrack, write_dome
+from .materials import Materials
+from .shapes import Geometries
+from .textures import Textures
+from .walk import Found, Walker
+
+_DEFAULT_WIDTH = 1280
+# Where the light comes from in a stage without a camera: above and behind the one who looks along -Z.
+_DOWNWARDS = np.array([[[0.8, -0.35, 0.49, 0], [0, 0.81, 0.58, 0], [-0.6, -0.47, 0.65, 0], [0, 0, 0, 1]]])
+
+
+@dataclass
+class Options:
+    """What to convert; None means the stage's own."""
+
+    frames: tuple[int, int] | None = None
+    resolution: tuple[int, int] | None = None
+    camera: str | None = None
+    variants: list[tuple[str, str, str]] = field(default_factory=list)
+    levels: int = 2
+    camera_light: bool = True
+    progress: Callable[[str], None] = lambda _line: None
+
+
+@dataclass
+class Track:
+    """One drawn thing, sampled."""
+
+    name: str
+    poses: list[np.ndarray] = field(default_factory=list)
+    visible: list[bool] = field(default_factory=list)
+    shapes: list[int | None] = field(default_factory=list)
+
+
+@dataclass
+class Result:
+    """What was written and what could not be carried."""
+
+    path: Path
+    lost: Lost
+    root: dict[str, Any]
+
+
+def convert(source: Path, target: Path, options: Options) -> Result:
+    """Convert the stage in `source` to `target` (.gltf or .glb)."""
+    target = Path(target).resolve()
+    if target.suffix not in (".gltf", ".glb"):
+        raise OutputError(f"{target}: the name must end in .gltf or .glb")
+    return _Conversion(source, target, options).run()
+
+
+def open_stage(source: Path, variants: list[tuple[str, str, str]], lost: Lost) -> Usd.Stage:
+    """Open a stage with variants chosen in its session layer, which is never saved."""
+    if not Path(source).is_file():
+        raise InputError(f"{source}: no such file")
+    # What is missing is taken from GetCompositionErrors(); USD's own stack traces on the terminal help nobody.
+    delegate = UsdUtils.CoalescingDiagnosticDelegate()
+    try:
+        stage = Usd.Stage.Open(str(source))
+    except Tf.ErrorException as error:
+        raise InputError(f"{source}: not a USD stage ({str(error).strip().splitlines()[-1].strip()})") from None
+    finally:
+        delegate.TakeUncoalescedDiagnostics()
+        del delegate
+    stage.SetEditTarget(stage.GetSessionLayer())
+    for path, name, choice in variants:
+        prim = stage.GetPrimAtPath(path) if path else stage.GetDefaultPrim()
+        owners = [prim] if prim and name in prim.GetVariantSets().GetNames() else []
+        if not path:
+            owners = owners or [p for p in stage.Traverse() if name in p.GetVariantSets().GetNames()]
+        if not owners:
+            have = sorted({f"{p.GetPath()}:{n}" for p in stage.Traverse() for n in p.GetVariantSets().GetNames()})
+            raise InputError(
+                f"variant set {name!r}: {path or 'no prim of the stage'} {'has it not' if path else 'has it'}; there are {', '.join(have) or 'none'}"
+            )
+        for owner in owners:
+            have = owner.GetVariantSet(name).GetVariantNames()
+            if choice not in have:
+                raise InputError(f"variant {name}={choice}: {owner.GetPath()} has {', '.join(have)}")
+            owner.GetVariantSet(name).SetVariantSelection(choice)
+    for error in stage.GetCompositionErrors():
+        text = " ".join(str(error).split())
+        where = re.search(r"<([^<>]*)>", str(getattr(error, "rootSite", ""))) or re.search(r"<([^<>]*)>", text)
+        name = where[1] if where else str(source)
+        lost.add(name, f"composition: {text[:200]}", "what it refers to is missing from the picture; check the path")
+    return stage
+
+
+class _Conversion:
+    def __init__(self, source: Path, target: Path, options: Options) -> None:
+        self.source, self.target, self.options = Path(source), target, options
+        self.lost = Lost()
+        self.stage = open_stage(self.source, options.variants, self.lost)
+        self.up = UsdGeom.GetStageUpAxis(self.stage)
+        self.units = UsdGeom.GetStageMetersPerUnit(self.stage)
+        self.root = np.eye(4)
+        self.root[:3, :3] *= self.units
+        if self.up == UsdGeom.Tokens.z:
+            self.root = self.root @ np.array([[1, 0, 0, 0], [0, 0, 1, 0], [0, -1, 0, 0], [0, 0, 0, 1]], float)
+        self.fps = extras.rational(self.stage.GetTimeCodesPerSecond() or 24.0)
+        self._settings()
+        self._bake_skins()
+        self.walker = Walker(self.stage, self.lost)
+        self.frames = options.frames or self._range()
+        if self.frames[1] < self.frames[0]:
+            raise InputError(f"frame range {self.frames[0]}-{self.frames[1]}: the last frame is before the first")
+        self.tracks: dict[tuple, Track] = {}
+        self.cameras: dict[tuple, CameraTrack] = {}
+        self.lights: dict[tuple, LightTrack] = {}
+        self.domes: dict[tuple, Found] = {}
+        self.geometry = Geometries(options.levels, self.lost)
+        self.taken: list[float] = []
+
+    def _settings(self) -> None:
+        """Resolution, pixel aspect, policy and camera from RenderSettings, overridden by their first product."""
+        settings = UsdRender.Settings.GetStageRenderSettings(self.stage)
+        prims = [settings.GetPrim()] if settings else [p for p in self.stage.Traverse() if p.IsA(UsdRender.Settings)][:1]
+        prims += [self.stage.GetPrimAtPath(t) for p in prims for t in UsdRender.Settings(p).GetProductsRel().GetTargets()][:1]
+        prims = prims or [p for p in self.stage.Traverse() if p.IsA(UsdRender.Product)][:1]
+        self.resolution, self.pixel_aspect, self.policy, self.camera = self.options.resolution, 1.0, "expandAperture", self.options.camera
+        for prim in (p for p in prims if p):
+            base = UsdRender.SettingsBase(prim)
+            size = base.GetResolutionAttr()
+            if self.options.resolution is None and (size.HasAuthoredValue() or self.resolution is None):
+                self.resolution = tuple(size.Get())
+            for attribute, name in ((base.GetPixelAspectRatioAttr(), "pixel_aspect"), (base.GetAspectRatioConformPolicyAttr(), "policy")):
+                if attribute.HasAuthoredValue():
+                    setattr(self, name, attribute.Get())
+            if self.options.camera is None and base.GetCameraRel().GetTargets():
+                self.camera = str(base.GetCameraRel().GetTargets()[0])
+            window = base.GetDataWindowNDCAttr()
+            if window.HasAuthoredValue() and tuple(window.Get()) != (0, 0, 1, 1):
+                self.lost.add(str(prim.GetPath()), "dataWindowNDC", "the whole picture is rendered; pass --crop to buzz-convert")
+        if self.policy == "adjustPixelAspectRatio":
+            self.lost.add("RenderSettings", "adjustPixelAspectRatio", "the pixel aspect of the first camera frame is used for the whole shot")
+
+    def _bake_skins(self) -> None:
+        """Let UsdSkel deform skinned meshes into time samples of the session layer."""
+        roots = [p for p in self.stage.Traverse() if p.IsA(UsdSkel.Root)]
+        if not roots:
+            return
+        self.options.progress(f"baking {len(roots)} skinned models")
+        if any(p.IsInstance() for p in self.stage.Traverse()):
+            # Baking writes points, which instances of one prototype cannot have of their own.
+            for prim in list(self.stage.Traverse()):
+                if prim.IsInstance() and any(below.IsA(UsdSkel.Root) for below in Usd.PrimRange(prim, Usd.TraverseInstanceProxies())):
+                    prim.SetInstanceable(False)
+        for root in [p for p in self.stage.Traverse() if p.IsA(UsdSkel.Root)]:
+            if not UsdSkel.BakeSkinning(Usd.PrimRange(root)):
+                self.lost.add(str(root.GetPath()), "skinning", "UsdSkel could not bake it; it stands in its rest pose")
+
+    def _range(self) -> tuple[int, int]:
+        if self.stage.HasAuthoredTimeCodeRange():
+            return math.floor(self.stage.GetStartTimeCode()), math.ceil(self.stage.GetEndTimeCode())
+        times = {t for prim in Usd.PrimRange.Stage(self.stage) for a in prim.GetAuthoredAttributes() for t in a.GetTimeSamples()}
+        return (math.floor(min(times)), math.ceil(max(times))) if times else (0, 0)
+
+    def run(self) -> Result:
+        """Do the whole job."""
+        self.options.progress(f"sampling frames {self.frames[0]}-{self.frames[1]}")
+        first, last = self.frames
+        static = not self._animated()
+        for frame in range(first, first + 1 if static else last + 1):
+            self._at(float(frame))
+        if not static:
+            for i, n in enumerate(self._steps()):
+                for k in range(1, n):
+                    self._at(first + i + k / n)
+        order = np.argsort(np.array(self.taken), kind="stable")
+        for track in [*self.tracks.values(), *self.lights.values(), *self.cameras.values()]:
+            for name, values in vars(track).items():
+                if isinstance(values, list):
+                    setattr(track, name, [values[i] for i in order])
+        frames = [self.taken[i] for i in order]
+        self.options.progress(f"writing {len(self.geometry.items)} meshes")
+        document = Document()
+        animation = motion.Animation(document, [(f - first) * self.fps[1] / self.fps[0] for f in frames])
+        now = Usd.TimeCode(first)
+        materials = Materials(document, Textures(document, self.target, self.lost), self.lost, now)
+        self.geometry.write(document, materials, np.array(self.taken))
+        for track in self.tracks.values():
+            self._write_track(document, animation, track)
+        for light in self.lights.values():
+            light.write(document, animation, self.lost)
+        for camera in self.cameras.values():
+            camera.write(document, animation, self.lost)
+        world = None
+        for found in self.domes.values():
+            if not found.visible:
+                continue
+            if world is not None:
+                self.lost.add(str(found.prim.GetPath()), "second dome light", "only the first is used; add their images up")
+                continue
+            world = write_dome(found.prim, now, self.root @ found.matrix, self.up, self.target, self.lost)
+        cuts = self._cuts()
+        if world is None and not self.lights and self.options.camera_light:
+            self._camera_light(document, animation, cuts)
+        animation.close()
+        self._finish(document, world, cuts)
+        return Result(self.target, self.lost, document.root)
+
+    def _animated(self) -> bool:
+        """Whether any attribute of the stage has more than one time sample (or clips)."""
+        predicate = Usd.TraverseInstanceProxies(Usd.PrimAllPrimsPredicate)
+        return any(a.ValueMightBeTimeVarying() for p in Usd.PrimRange.Stage(self.stage, predicate) for a in p.GetAttributes())
+
+    def _steps(self) -> np.ndarray:
+        tracks = [t.poses for t in [*self.tracks.values(), *self.lights.values(), *self.cameras.values()]]
+        if not tracks:
+            return np.ones(max(len(self.taken) - 1, 0), dtype=int)
+        poses = np.stack([np.array(t) for t in tracks], axis=1)
+        places = poses[..., :3, 3].reshape(-1, 3)
+        return motion.steps_between(poses, max(float(np.linalg.norm(np.ptp(places, axis=0))), 1.0))
+
+    def _at(self, frame: float) -> None:
+        time, sample = Usd.TimeCode(frame), len(self.taken)
+        seen = set()
+        aspect = None
+        if self.resolution is not None:
+            aspect = self.resolution[0] * self.pixel_aspect / self.resolution[1]
+        for found in self.walker.at(time):
+            seen.add(found.key)
+            world = self.root @ found.matrix
+            if found.kind == "camera":
+                track = self.cameras.setdefault(found.key, CameraTrack(found.prim))
+                track.sample(time, world, self.units, aspect, self.policy)
+            elif found.kind == "dome":
+                self.domes.setdefault(found.key, found)
+            elif found.kind == "light":
+                light = self.lights.setdefault(found.key, LightTrack(found.prim))
+                for _ in range(len(light.poses), sample):
+                    light.sample(time, world, False, self.units)
+                light.sample(time, world, found.visible, self.units)
+            else:
+                self._drawn(found, world, time, sample)
+        for key, track in [*self.tracks.items(), *self.lights.items()]:
+            if key not in seen:
+                for name, values in vars(track).items():
+                    if isinstance(values, list):
+                        values.append(False if name == "visible" else values[-1])
+        self.taken.append(frame)
+
+    def _drawn(self, found: Found, world: np.ndarray, time: Usd.TimeCode, sample: int) -> None:
+        shape = self.geometry.of(found.prim, found.kind, time, sample)
+        if shape is None and found.key not in self.tracks:
+            return
+        track = self.tracks.setdefault(found.key, Track(found.prim.GetName()))
+        if shape is not None:
+            world = world @ self.geometry.items[shape].placed
+        for visible in [False] * (sample - len(track.poses)) + [found.visible and shape is not None]:
+            track.poses.append(world)
+            track.visible.append(visible)
+            track.shapes.append(shape)
+
+    def _write_track(self, document: Document, animation: motion.Animation, track: Track) -> None:
+        poses = np.array(track.poses)
+        for number in dict.fromkeys(n for n in track.shapes if n is not None):
+            item = self.geometry.items[number]
+            shown = np.array([v and n == number for v, n in zip(track.visible, track.shapes, strict=True)])
+            if not shown.any() or item.mesh is None:
+                continue
+            node: dict[str, Any] = {"name": track.name, "mesh": item.mesh}
+            if motion.is_sheared(poses):
+                upper, lower = motion.split_sheared(poses)
+                parent: dict[str, Any] = {"name": f"{track.name} (sheared)"}
+                above = document.append("nodes", parent)
+                index = document.append("nodes", node)
+                parent["children"] = [index]
+                animation.node(parent, above, upper)
+                animation.node(node, index, lower)
+            else:
+                index = document.append("nodes", node)
+                animation.node(node, index, poses)
+            if item.binding is not None:
+                node.setdefault("extensions", {})["BUZZ_analytic_shape"] = item.binding
+            animation.visibility(node, index, shown)
+            if item.weights is not None:
+                animation.weights(index, item.weights)
+
+    def _cuts(self) -> list[dict[str, Any]]:
+        """The camera asked for, the render settings', the one bound in a viewer, or the first that moves."""
+        tracks = {str(t.prim.GetPath()): t for t in self.cameras.values()}
+        wanted = self.camera
+        if wanted is not None and wanted not in tracks:
+            near = [p for p in tracks if p.endswith("/" + wanted.lstrip("/"))]
+            if len(near) != 1:
+                raise InputError(f"camera {wanted}: the stage has {', '.join(tracks) or 'none'}")
+            wanted = near[0]
+        if wanted is None:
+            bound = self.stage.GetRootLayer().customLayerData.get("cameraSettings", {}).get("boundCamera")
+            moving = next((p for p, t in tracks.items() if motion.varies(np.array(t.poses))), None)
+            wanted = bound if bound in tracks else moving or next(iter(tracks), None)
+        if wanted is None:
+            self.lost.add(str(self.source.name), "no camera", "add a Camera to the stage, or convert with --turntable")
+            return []
+        return [{"frame": self.frames[0], "camera": wanted, "node": tracks[wanted].node}]
+
+    def _camera_light(self, document: Document, animation: motion.Animation, cuts: list[dict[str, Any]]) -> None:
+        """A stage without lights is lit from the camera, as usdview and usdrecord do: white that faces it comes out as 1."""
+        document.use_extension("KHR_lights_punctual")
+        light = {"type": "directional", "name": "camera light", "intensity": extras.LUMENS_PER_WATT * math.pi}
+        document.root.setdefault("extensions", {})["KHR_lights_punctual"] = {"lights": [light]}
+        node: dict[str, Any] = {"name": "camera light", "extensions": {"KHR_lights_punctual": {"light": 0}}}
+        index = document.append("nodes", node)
+        track = next((t for t in self.cameras.values() if cuts and t.node == cuts[0]["node"]), None)
+        animation.node(node, index, np.array(track.poses) if track else _DOWNWARDS)
+        self.lost.add(self.source.name, "no lights", "it is lit from the camera as usdview does; add lights, or pass --no-camera-light")
+
+    def _finish(self, document: Document, world: dict[str, Any] | None, cuts: list[dict[str, Any]]) -> None:
+        nodes = document.root.get("nodes", [])
+        below = {child for node in nodes for child in node.get("children", [])}
+        scene: dict[str, Any] = {"name": self.source.stem}
+        top = [i for i in range(len(nodes)) if i not in below]
+        if top:
+            scene["nodes"] = top
+        track = next((t for t in self.cameras.values() if cuts and t.node == cuts[0]["node"]), None)
+        if self.resolution is None:
+            # As usdrecord does it: a fixed width, and the height of the camera's own aspect.
+            aspect = track.lens[0]["aspect"] if track else 16 / 9
+            self.resolution = (_DEFAULT_WIDTH, max(round(_DEFAULT_WIDTH / aspect), 1))
+        if self.policy == "adjustPixelAspectRatio" and track:
+            self.pixel_aspect = track.lens[0]["aspect"] * self.resolution[1] / self.resolution[0]
+        shutter = self._shutter(track)
+        buzz = extras.scene_extras(
+            generator="Buzz USD converter",
+            application=f"USD {'.'.join(map(str, Usd.GetVersion()))}",
+            file=str(self.source),
+            fps=self.fps,
+            frames=self.frames,
+            resolution=self.resolution,
+            pixel_aspect=self.pixel_aspect,
+            shutter=shutter,
+            cuts=cuts,
+            world=world,
+            lost=self.lost,
+        )
+        buzz["aspect_policy"] = self.policy
+        scene["extras"] = {"buzz": buzz}
+        document.root["asset"] = {"version": "2.0", "generator": buzz["generator"]}
+        document.root["scenes"], document.root["scene"] = [scene], 0
+        extras.check(document.root)
+        save(document, self.target)
+
+    def _shutter(self, track: CameraTrack | None) -> float | None:
+        if track is None:
+            return None
+        camera = UsdGeom.Camera(track.prim)
+        opened, closed = camera.GetShutterOpenAttr().Get(self.frames[0]), camera.GetShutterCloseAttr().Get(self.frames[0])
+        return closed - opened if closed > opened else None
+
+
+def save(document: Document, target: Path) -> None:
+    """Write through pygltflib."""
+    root = {k: v for k, v in document.root.items() if v not in ([], {})}
+    if document.binary:
+        root["buffers"] = [{"byteLength": len(document.binary)}]
+        if target.suffix == ".gltf":
+            root["buffers"][0]["uri"] = quote(f"{target.stem}.bin")
+            write_whole(target.with_suffix(".bin"), bytes(document.binary))
+    gltf = pygltflib.GLTF2.from_json(json.dumps(root))
+    if target.suffix == ".gltf":
+        write_whole(target, gltf.gltf_to_json(separators=(",", ":"), indent=None).encode())
+        return
+    gltf.set_binary_blob(bytes(document.binary))
+    write_whole(target, b"".join(gltf.save_to_bytes()))

@@ -1,0 +1,233 @@
+"""UsdGeomMesh to glTF primitives: primvars of every interpolation, GeomSubsets, subdivision, movement of points."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from pxr import Usd, UsdGeom, UsdShade
+
+from ..common.report import Lost
+from .subdivide import INFINITE, Polygons, catmull_clark, smooth_normals
+
+_MAX_FACES = 4_000_000
+
+
+@dataclass
+class Primitive:
+    """Triangles of one material: arrays by glTF attribute name, and the morph poses as (POSITION, NORMAL) arrays."""
+
+    attributes: dict[str, np.ndarray]
+    indices: np.ndarray
+    # What binds its material: the mesh or one of its GeomSubsets.
+    source: Usd.Prim
+    # For each vertex, its point; for normals of poses, its corner.
+    corner_of: np.ndarray
+    poses: list[dict[str, np.ndarray]] = field(default_factory=list)
+
+
+def read_mesh(prim: Usd.Prim, time: Usd.TimeCode, levels: int, lost: Lost) -> list[Primitive]:
+    """The primitives of a mesh at one time; none if it has no valid face."""
+    mesh = UsdGeom.Mesh(prim)
+    polygons, has_normals = _polygons(mesh, time, levels, lost)
+    if polygons is None:
+        return []
+    return [_primitive(polygons, chosen, source, has_normals) for source, chosen in _subsets(mesh, polygons, time, lost)]
+
+
+def add_pose(primitives: list[Primitive], prim: Usd.Prim, time: Usd.TimeCode, levels: int, lost: Lost) -> bool:
+    """Record the mesh's shape at another time; False if its topology is another."""
+    polygons, has_normals = _polygons(UsdGeom.Mesh(prim), time, levels, lost)
+    if polygons is None or any(len(p.corner_of) and p.corner_of.max() >= len(polygons.corners) for p in primitives):
+        return False
+    for p in primitives:
+        pose = {"POSITION": polygons.points[polygons.corners[p.corner_of]]}
+        if has_normals:
+            pose["NORMAL"] = polygons.corner["NORMAL"][p.corner_of]
+        p.poses.append(pose)
+    return True
+
+
+def may_deform(prim: Usd.Prim) -> bool:
+    """Whether the points of a mesh move against it."""
+    mesh = UsdGeom.Mesh(prim)
+    return any(a.ValueMightBeTimeVarying() for a in (mesh.GetPointsAttr(), mesh.GetFaceVertexIndicesAttr(), mesh.GetNormalsAttr()))
+
+
+def _polygons(mesh: UsdGeom.Mesh, time: Usd.TimeCode, levels: int, lost: Lost) -> tuple[Polygons | None, bool]:
+    """The mesh with all primvars at corners, subdivided; and whether it has normals."""
+    path = str(mesh.GetPath())
+    points = np.array(mesh.GetPointsAttr().Get(time) or [], dtype=float).reshape(-1, 3)
+    counts = np.array(mesh.GetFaceVertexCountsAttr().Get(time) or [], dtype=int)
+    corners = np.array(mesh.GetFaceVertexIndicesAttr().Get(time) or [], dtype=int)
+    if not len(points) or not len(counts):
+        lost.add(path, "mesh without faces", "it is left out")
+        return None, False
+    if counts.sum() != len(corners) or counts.min() < 0 or corners.min() < 0 or corners.max() >= len(points):
+        lost.add(path, "damaged mesh (its indices do not fit its points)", "it is left out; check it with usdchecker")
+        return None, False
+    if not np.isfinite(points).all():
+        lost.add(path, "points that are not numbers", "they are moved to the origin")
+        points = np.nan_to_num(points, nan=0.0, posinf=0.0, neginf=0.0)
+    scheme = mesh.GetSubdivisionSchemeAttr().Get(time)
+    if scheme == UsdGeom.Tokens.loop:
+        lost.add(path, "loop subdivision", "it is drawn as its cage; convert it to catmullClark")
+    out = Polygons(points, counts, corners, np.arange(len(counts)))
+    _creases(mesh, time, out)
+    subdivide = levels if scheme == UsdGeom.Tokens.catmullClark else 0
+    _primvars(mesh, time, out, lost)
+    if subdivide:
+        # Authored normals mean nothing on a subdivision surface (UsdGeomMesh: "normals are ignored").
+        out.corner.pop("NORMAL", None)
+    rule = mesh.GetInterpolateBoundaryAttr().Get(time)
+    for level in range(subdivide):
+        if len(out.corners) * 4 > _MAX_FACES:
+            lost.add(path, f"subdivision beyond level {level}", "it would make more than four million faces; simplify the cage")
+            break
+        out = catmull_clark(out, corners_sharp=rule != UsdGeom.Tokens.edgeOnly)
+    holes = np.array(mesh.GetHoleIndicesAttr().Get(time) or [], dtype=int)
+    good = ~np.isin(out.parents, holes) & (out.counts >= 3)
+    if not good.all():
+        out = _keep(out, good)
+    if not len(out.counts):
+        return None, False
+    if scheme == UsdGeom.Tokens.catmullClark:
+        out.corner["NORMAL"] = smooth_normals(out)
+    if mesh.GetOrientationAttr().Get(time) == UsdGeom.Tokens.leftHanded:
+        _flip(out)
+        if scheme == UsdGeom.Tokens.catmullClark:
+            out.corner["NORMAL"] *= -1
+    return out, "NORMAL" in out.corner
+
+
+def _creases(mesh: UsdGeom.Mesh, time: Usd.TimeCode, out: Polygons) -> None:
+    lengths = np.array(mesh.GetCreaseLengthsAttr().Get(time) or [], dtype=int)
+    indices = np.array(mesh.GetCreaseIndicesAttr().Get(time) or [], dtype=int)
+    sharp = np.array(mesh.GetCreaseSharpnessesAttr().Get(time) or [], dtype=float)
+    edges, values, at, used = [], [], 0, 0
+    for length in lengths:
+        for k in range(length - 1):
+            if at + k + 1 < len(indices):
+                edges.append((indices[at + k], indices[at + k + 1]))
+                # One value for each crease, or one for each of its edges.
+                number = used + k if len(sharp) != len(lengths) else used
+                values.append(sharp[number] if number < len(sharp) else 0.0)
+        at += length
+        used += 1 if len(sharp) == len(lengths) else length - 1
+    if edges:
+        out.edges, out.sharpness = np.array(edges), np.minimum(np.array(values), INFINITE)
+    out.point_sharpness = np.zeros(len(out.points))
+    corners = np.array(mesh.GetCornerIndicesAttr().Get(time) or [], dtype=int)
+    weights = np.array(mesh.GetCornerSharpnessesAttr().Get(time) or [], dtype=float)
+    n = min(len(corners), len(weights))
+    valid = corners[:n] < len(out.points)
+    out.point_sharpness[corners[:n][valid]] = np.minimum(weights[:n][valid], INFINITE)
+
+
+def _primvars(mesh: UsdGeom.Mesh, time: Usd.TimeCode, out: Polygons, lost: Lost) -> None:
+    """Texture coordinates, colour and normals as values at corners (colours and st at points where they may be smoothed)."""
+    api = UsdGeom.PrimvarsAPI(mesh.GetPrim())
+    sets = 0
+    for primvar in api.FindPrimvarsWithInheritance():
+        kind = str(primvar.GetTypeName().scalarType)
+        name = primvar.GetPrimvarName()
+        if kind in ("texCoord2f", "texCoord2d", "texCoord2h", "float2") and sets < 4:
+            values = _at_corners(primvar, time, out, 2, str(mesh.GetPath()), lost)
+            if values is not None:
+                # USD's v goes up, glTF's goes down.
+                out.corner[f"st:{name}"] = np.stack([values[:, 0], 1 - values[:, 1]], axis=1)
+                sets += 1
+        elif name == "displayColor":
+            values = _at_corners(primvar, time, out, 3, str(mesh.GetPath()), lost)
+            if values is not None:
+                out.corner["colour"] = values
+        elif name == "displayOpacity":
+            values = _at_corners(primvar, time, out, 1, str(mesh.GetPath()), lost)
+            if values is not None:
+                out.corner["opacity"] = values
+    # `primvars:normals` wins over the attribute `normals` (UsdGeomPointBased).
+    normals = api.GetPrimvar("normals")
+    values = None
+    if normals and normals.HasValue():
+        values = _at_corners(normals, time, out, 3, str(mesh.GetPath()), lost)
+    elif mesh.GetNormalsAttr().HasAuthoredValue():
+        data = np.array(mesh.GetNormalsAttr().Get(time) or [], dtype=float).reshape(-1, 3)
+        values = _spread(data, mesh.GetNormalsInterpolation(), out, str(mesh.GetPath()), "normals", lost)
+    if values is not None:
+        length = np.linalg.norm(values, axis=1, keepdims=True)
+        out.corner["NORMAL"] = np.where(length > 1e-12, values / np.maximum(length, 1e-30), (0, 1, 0))
+
+
+def _at_corners(primvar: UsdGeom.Primvar, time: Usd.TimeCode, out: Polygons, width: int, path: str, lost: Lost) -> np.ndarray | None:
+    """A primvar's values at every corner, indices resolved; None if it has none or they do not fit."""
+    data = primvar.ComputeFlattened(time) if primvar.IsIndexed() else primvar.Get(time)
+    if data is None:
+        return None
+    values = np.array(data, dtype=float).reshape(-1, width)
+    return _spread(values, primvar.GetInterpolation(), out, path, f"primvar {primvar.GetPrimvarName()}", lost)
+
+
+def _spread(values: np.ndarray, interpolation: str, out: Polygons, path: str, name: str, lost: Lost) -> np.ndarray | None:
+    """Values of an interpolation at every corner."""
+    face_of = np.repeat(np.arange(len(out.counts)), out.counts)
+    index = {
+        UsdGeom.Tokens.constant: np.zeros(len(out.corners), dtype=int),
+        UsdGeom.Tokens.uniform: face_of,
+        UsdGeom.Tokens.vertex: out.corners,
+        UsdGeom.Tokens.varying: out.corners,
+        UsdGeom.Tokens.faceVarying: np.arange(len(out.corners)),
+    }.get(interpolation)
+    if index is None or (len(index) and index.max() >= len(values)):
+        lost.add(path, f"{name} (its size does not fit {interpolation})", "it is left out; check it with usdchecker")
+        return None
+    return values[index]
+
+
+def _keep(mesh: Polygons, faces: np.ndarray) -> Polygons:
+    mask = np.repeat(faces, mesh.counts)
+    corner = {k: v[mask] for k, v in mesh.corner.items()}
+    return Polygons(mesh.points, mesh.counts[faces], mesh.corners[mask], mesh.parents[faces], mesh.edges, mesh.sharpness, mesh.point_sharpness, {}, corner)
+
+
+def _flip(mesh: Polygons) -> None:
+    """Turn every face round."""
+    starts = np.concatenate([[0], np.cumsum(mesh.counts)[:-1]])
+    index = np.repeat(starts + mesh.counts - 1, mesh.counts) - (np.arange(len(mesh.corners)) - np.repeat(starts, mesh.counts))
+    mesh.corners = mesh.corners[index]
+    mesh.corner = {k: v[index] for k, v in mesh.corner.items()}
+
+
+def _subsets(mesh: UsdGeom.Mesh, polygons: Polygons, time: Usd.TimeCode, lost: Lost) -> list[tuple[Usd.Prim, np.ndarray]]:
+    """Material subsets as (prim that binds, faces); faces in no subset go with the mesh itself."""
+    rest = np.ones(len(polygons.counts), dtype=bool)
+    found = []
+    for subset in UsdShade.MaterialBindingAPI(mesh.GetPrim()).GetMaterialBindSubsets():
+        chosen = np.isin(polygons.parents, np.array(subset.GetIndicesAttr().Get(time) or [], dtype=int)) & rest
+        if chosen.any():
+            found.append((subset.GetPrim(), chosen))
+            rest &= ~chosen
+    for subset in UsdGeom.Subset.GetAllGeomSubsets(mesh):
+        if (
+            subset.GetFamilyNameAttr().Get() not in (UsdShade.Tokens.materialBind, None, "")
+            and UsdShade.MaterialBindingAPI(subset.GetPrim()).GetDirectBinding().GetMaterial()
+        ):
+            lost.add(str(subset.GetPath()), "GeomSubset outside the family materialBind", "set its familyName to materialBind")
+    if rest.any():
+        found.append((mesh.GetPrim(), rest))
+    return found
+
+
+def _primitive(mesh: Polygons, chosen: np.ndarray, source: Usd.Prim, has_normals: bool) -> Primitive:
+    """Triangulate faces as fans and join equal corners into vertices."""
+    starts = np.concatenate([[0], np.cumsum(mesh.counts)[:-1]])[chosen]
+    counts = mesh.counts[chosen]
+    fans = np.repeat(np.arange(len(counts)), counts - 2)
+    step = np.arange(len(fans)) - np.repeat(np.concatenate([[0], np.cumsum(counts - 2)[:-1]]), counts - 2)
+    triangles = np.stack([starts[fans], starts[fans] + step + 1, starts[fans] + step + 2], axis=1).reshape(-1)
+    columns = [mesh.corners[triangles, None].astype(float)]
+    columns += [np.round(v[triangles], 7) for v in mesh.corner.values()]
+    _, first, indices = np.unique(np.concatenate(columns, axis=1), axis=0, return_index=True, return_inverse=True)
+    corner_of = triangles[first]
+    attributes = {"POSITION": mesh.points[mesh.corners[corner_of]].astype(np.float32)}
+    attributes |= {k: v[corner_of].astype(np.float32) for k, v in mesh.corner.items()}
+    return Primitive(attributes, indices.reshape(-1).astype(np.uint32), source, corner_of)

@@ -1,0 +1,211 @@
+"""Geometry of one export: what each prim is drawn with, and the glTF meshes made of it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from pxr import Usd, UsdGeom, UsdShade
+
+from ..common.document import ARRAY_BUFFER, ELEMENT_ARRAY_BUFFER, Document
+from ..common.morph import choose_targets
+from ..common.report import Lost
+from .gprims import read_gprim
+from .materials import Materials
+from .mesh import Primitive, add_pose, may_deform, read_mesh
+
+_DISPLAY = (0.5, 0.5, 0.5, 1.0)
+
+
+@dataclass
+class Geometry:
+    """What a prim is drawn with."""
+
+    prim: Usd.Prim
+    prim_time: Usd.TimeCode
+    primitives: list[Primitive]
+    placed: np.ndarray = field(default_factory=lambda: np.eye(4))
+    implicit: dict | None = None
+    # The samples at which poses were taken; the first belongs to the mesh itself.
+    samples: list[int] = field(default_factory=list)
+    mesh: int | None = None
+    binding: dict | None = None
+    weights: np.ndarray | None = None
+
+
+class Geometries:
+    """Hands out geometry numbers; instances of one prototype with the same materials share one."""
+
+    def __init__(self, levels: int, lost: Lost) -> None:
+        self.levels, self.lost = levels, lost
+        self.items: list[Geometry] = []
+        self._by_source: dict[tuple, list[int]] = {}
+        self._current: dict[tuple, int] = {}
+        self._sample = -1
+
+    def of(self, prim: Usd.Prim, kind: str, time: Usd.TimeCode, sample: int) -> int | None:
+        """The geometry of a prim at a sample; None if there is nothing to draw."""
+        if sample != self._sample:
+            self._sample, self._current = sample, {}
+        source = _source(prim)
+        if source in self._current:
+            return self._current[source]
+        known = self._by_source.setdefault(source, [])
+        if known and not (kind == "mesh" and may_deform(prim)):
+            return known[0]
+        number = self._next(prim, kind, time, sample, known)
+        if number is not None:
+            self._current[source] = number
+        return number
+
+    def _next(self, prim: Usd.Prim, kind: str, time: Usd.TimeCode, sample: int, known: list[int]) -> int | None:
+        for number in reversed(known):
+            item = self.items[number]
+            same = self._corners(prim, time) == self._corners(prim, item.prim_time)
+            if same and add_pose(item.primitives, prim, time, self.levels, self.lost):
+                item.samples.append(sample)
+                return number
+        if kind == "mesh":
+            primitives = read_mesh(prim, time, self.levels, self.lost)
+            if not primitives:
+                return None
+            item = Geometry(prim, time, primitives, samples=[sample])
+        else:
+            shape = read_gprim(prim, time)
+            varying = [a.GetName() for a in prim.GetAttributes() if a.GetName() in _SIZES and a.ValueMightBeTimeVarying()]
+            if varying:
+                self.lost.add(str(prim.GetPath()), f"animated {', '.join(varying)}", "animate its scale instead; the first frame's is used")
+            arrays = {"POSITION": shape.points.astype(np.float32), "NORMAL": shape.normals.astype(np.float32)}
+            arrays |= _constant_colour(prim, time, len(shape.points))
+            primitive = Primitive(arrays, shape.indices.astype(np.uint32), prim, np.empty(0, int))
+            item = Geometry(prim, time, [primitive], shape.placed, shape.implicit, [sample])
+        self.items.append(item)
+        known.append(len(self.items) - 1)
+        return known[-1]
+
+    @staticmethod
+    def _corners(prim: Usd.Prim, time: Usd.TimeCode) -> tuple:
+        mesh = UsdGeom.Mesh(prim)
+        counts, corners = mesh.GetFaceVertexCountsAttr().Get(time), mesh.GetFaceVertexIndicesAttr().Get(time)
+        return (np.array(counts or []).tobytes(), np.array(corners or []).tobytes())
+
+    def write(self, document: Document, materials: Materials, taken: np.ndarray) -> None:
+        """Make the glTF meshes. `taken` holds the frame of each sample in the order in which they were taken."""
+        for item in self.items:
+            self._write(item, document, materials, taken)
+
+    def _write(self, item: Geometry, document: Document, materials: Materials, taken: np.ndarray) -> None:
+        chosen = None
+        if len(item.samples) > 1:
+            order = sorted(range(len(item.samples)), key=lambda k: taken[item.samples[k]])
+            times = taken[[item.samples[k] for k in order]]
+            rows = [np.concatenate([_pose(p, k)["POSITION"].reshape(-1) for p in item.primitives]) for k in order]
+            chosen = choose_targets(np.stack(rows), times, np.sort(taken))
+            if chosen is not None:
+                numbers, item.weights = chosen
+                chosen = [order[n] for n in numbers]
+        double = bool(UsdGeom.Gprim(item.prim).GetDoubleSidedAttr().Get())
+        primitives = []
+        for p in item.primitives:
+            names = [k.removeprefix("st:") for k in p.attributes if k.startswith("st:")]
+            plain, vertex_colours = _display(p)
+            number, sets, display = materials.of(p.source, double, names, plain)
+            if display and vertex_colours is None and UsdShade.MaterialBindingAPI(p.source).ComputeBoundMaterial()[0]:
+                vertex_colours = np.tile(plain, (len(p.attributes["POSITION"]), 1))
+            data: dict[str, Any] = {
+                "attributes": self._attributes(p, sets, vertex_colours if display else None, document),
+                "indices": document.add_accessor(_small(p.indices), ELEMENT_ARRAY_BUFFER),
+                "material": number,
+            }
+            if chosen:
+                data["targets"] = [self._target(p, k, document) for k in chosen]
+            primitives.append(data)
+        mesh: dict[str, Any] = {"name": item.prim.GetName(), "primitives": primitives}
+        if chosen:
+            mesh["weights"] = [0.0] * len(chosen)
+        item.mesh = document.append("meshes", mesh)
+        if item.implicit is not None and not _textured(document.root["materials"][primitives[0]["material"]]):
+            document.use_extension("KHR_implicit_shapes")
+            document.use_extension("BUZZ_analytic_shape")
+            shapes = document.root.setdefault("extensions", {}).setdefault("KHR_implicit_shapes", {}).setdefault("shapes", [])
+            if item.implicit not in shapes:
+                shapes.append(item.implicit)
+            item.binding = {"shape": shapes.index(item.implicit), "material": primitives[0]["material"]}
+
+    def _attributes(self, p: Primitive, sets: list[str], colours: np.ndarray | None, document: Document) -> dict[str, int]:
+        out = {"POSITION": document.add_accessor(p.attributes["POSITION"], ARRAY_BUFFER, limits=True)}
+        if "NORMAL" in p.attributes:
+            out["NORMAL"] = document.add_accessor(_unit(p.attributes["NORMAL"]), ARRAY_BUFFER)
+        for number, name in enumerate(sets):
+            values = p.attributes.get(f"st:{name}")
+            if values is None:
+                path = str(p.source.GetPath())
+                self.lost.add(path, f"primvar {name!r} that its material reads is missing", "its texture shows one colour; add the primvar")
+                values = np.zeros((len(p.attributes["POSITION"]), 2), dtype=np.float32)
+            out[f"TEXCOORD_{number}"] = document.add_accessor(values, ARRAY_BUFFER)
+        if colours is not None:
+            out["COLOR_0"] = document.add_accessor(np.clip(colours, 0, 1).astype(np.float32), ARRAY_BUFFER)
+        return out
+
+    @staticmethod
+    def _target(p: Primitive, k: int, document: Document) -> dict[str, int]:
+        pose = _pose(p, k)
+        out = {"POSITION": document.add_accessor((pose["POSITION"] - p.attributes["POSITION"]).astype(np.float32), ARRAY_BUFFER, limits=True)}
+        if "NORMAL" in pose and "NORMAL" in p.attributes:
+            out["NORMAL"] = document.add_accessor((_unit(pose["NORMAL"]) - _unit(p.attributes["NORMAL"])).astype(np.float32), ARRAY_BUFFER)
+        return out
+
+
+_SIZES = ("radius", "size", "height", "radiusTop", "radiusBottom", "width", "length", "axis")
+
+
+def _source(prim: Usd.Prim) -> tuple:
+    """What makes two prims' geometry the same: the prim in the prototype and what is bound to it."""
+    shared = prim.GetPrimInPrototype() if prim.IsInstanceProxy() else prim
+    bound = [prim, *UsdShade.MaterialBindingAPI(prim).GetMaterialBindSubsets()]
+    paths = [str(UsdShade.MaterialBindingAPI(getattr(b, "GetPrim", lambda b=b: b)()).ComputeBoundMaterial()[0].GetPath()) for b in bound]
+    return (str(shared.GetPath()), *paths)
+
+
+def _pose(p: Primitive, k: int) -> dict[str, np.ndarray]:
+    """Pose 0 is the primitive itself, the others were added."""
+    return p.attributes if k == 0 else p.poses[k - 1]
+
+
+def _display(p: Primitive) -> tuple[tuple[float, ...], np.ndarray | None]:
+    """Display colour and opacity as one material colour, or as vertex colours."""
+    colour, opacity = p.attributes.get("colour"), p.attributes.get("opacity")
+    if colour is None and opacity is None:
+        return _DISPLAY, None
+    n = len(p.attributes["POSITION"])
+    whole = np.empty((n, 4))
+    whole[:, :3] = colour if colour is not None else _DISPLAY[:3]
+    whole[:, 3] = opacity[:, 0] if opacity is not None else 1
+    if n and (whole == whole[0]).all():
+        return tuple(float(x) for x in whole[0]), None
+    transparent = (1.0, 1.0, 1.0, 0.999) if opacity is not None and opacity.min() < 1 else (1.0, 1.0, 1.0, 1.0)
+    return transparent, whole
+
+
+def _constant_colour(prim: Usd.Prim, time: Usd.TimeCode, n: int) -> dict[str, np.ndarray]:
+    """Display colour of a gprim: its first value for all of it."""
+    out = {}
+    for key, attribute in (("colour", UsdGeom.Gprim(prim).GetDisplayColorPrimvar()), ("opacity", UsdGeom.Gprim(prim).GetDisplayOpacityPrimvar())):
+        value = attribute.Get(time) if attribute else None
+        if value:
+            out[key] = np.tile(np.array(value[0], dtype=float).reshape(1, -1), (n, 1))
+    return out
+
+
+def _small(indices: np.ndarray) -> np.ndarray:
+    return indices.astype(np.uint16) if len(indices) and indices.max() < 65535 else indices.astype(np.uint32)
+
+
+def _unit(normals: np.ndarray) -> np.ndarray:
+    normals = normals.astype(np.float64)
+    return (normals / np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-30)).astype(np.float32)
+
+
+def _textured(material: dict) -> bool:
+    return "Texture" in str([k for k in (*material, *material.get("pbrMetallicRoughness", {})) if k.endswith("Texture")])

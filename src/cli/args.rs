@@ -1,0 +1,208 @@
+//! Arguments as typed.
+
+use clap::{Args, Parser, Subcommand, ValueEnum};
+use std::path::PathBuf;
+
+/// Renders an animated camera move: traces key frames, infers the frames between them, writes EXRs.
+#[derive(Debug, Parser)]
+#[command(
+    name = "buzz-convert",
+    version,
+    args_conflicts_with_subcommands = true,
+    subcommand_negates_reqs = true,
+    after_help = "Exit status: 0 done, 1 a frame failed, 2 usage, 3 input missing, invalid or unsupported, \
+                  4 output not writable, 130/143 interrupted (finished frames are whole).\n\
+                  Example: buzz-convert anim.gltf out/ -r 1920x1080 -f 1-100"
+)]
+pub struct Cli {
+    #[command(subcommand)]
+    pub command: Option<Command>,
+    #[command(flatten)]
+    pub convert: ConvertArgs,
+}
+
+#[derive(Debug, Subcommand)]
+pub enum Command {
+    /// Show the key frames and segments, and why they are there; renders nothing.
+    Plan(PlanArgs),
+    /// Show what the scene holds, what it requires and what will be ignored.
+    Inspect(InspectArgs),
+    /// Measure the error of a sequence against a reference, frame by frame.
+    Compare(CompareArgs),
+}
+
+/// Optional for the parser's sake only: a subcommand takes their place.
+#[derive(Debug, Args)]
+pub struct ConvertArgs {
+    /// The scene: .gltf, .glb, or .obj (with --camera-from or --turntable).
+    #[arg(required = true)]
+    pub input: Option<PathBuf>,
+    /// Folder for the EXR sequence and report.json.
+    #[arg(required = true)]
+    pub out_dir: Option<PathBuf>,
+    #[command(flatten)]
+    pub scene: SceneArgs,
+    #[command(flatten)]
+    pub image: ImageArgs,
+    #[command(flatten)]
+    pub output: OutputArgs,
+}
+
+#[derive(Debug, Args)]
+pub struct PlanArgs {
+    /// The scene: .gltf, .glb, or .obj (with --camera-from or --turntable).
+    pub input: PathBuf,
+    #[command(flatten)]
+    pub scene: SceneArgs,
+    #[command(flatten)]
+    pub image: ImageArgs,
+    /// How to print.
+    #[arg(long, value_enum, default_value = "text")]
+    pub format: Format,
+}
+
+#[derive(Debug, Args)]
+pub struct InspectArgs {
+    /// The scene: .gltf, .glb or .obj.
+    pub input: PathBuf,
+    #[command(flatten)]
+    pub scene: SceneArgs,
+    /// How to print.
+    #[arg(long, value_enum, default_value = "text")]
+    pub format: Format,
+}
+
+#[derive(Debug, Args)]
+pub struct CompareArgs {
+    /// Folder with the sequence to measure.
+    pub dir: PathBuf,
+    /// Folder with the sequence to measure it against.
+    pub reference: PathBuf,
+    /// How to print.
+    #[arg(long, value_enum, default_value = "text")]
+    pub format: Format,
+    /// Exit with 1 if any frame's PSNR is under this.
+    #[arg(long, value_name = "DB")]
+    pub fail_below: Option<f64>,
+}
+
+/// What to read, and how.
+#[derive(Debug, Args)]
+pub struct SceneArgs {
+    /// Frames per second: 24, 23.976 or 24000/1001 [default: the scene's, else 24].
+    #[arg(long)]
+    pub fps: Option<String>,
+    /// Camera by name or index [default: the scene's cuts, else the first animated camera, else the first].
+    #[arg(short, long)]
+    pub camera: Option<String>,
+    /// Renumber: the first frame gets this number.
+    #[arg(long, value_name = "N", allow_negative_numbers = true)]
+    pub start_frame: Option<i64>,
+    /// Orbit the scene in so many frames, for a file without a camera.
+    #[arg(long, value_name = "FRAMES")]
+    pub turntable: Option<u32>,
+    /// Add static geometry from an OBJ file; may be given again.
+    #[arg(long, value_name = "OBJ")]
+    pub geometry: Vec<PathBuf>,
+    /// Take cameras, lights and animation from this glTF, for an OBJ input.
+    #[arg(long, value_name = "GLTF")]
+    pub camera_from: Option<PathBuf>,
+    /// Treat a scene feature that would be ignored as an error.
+    #[arg(long)]
+    pub strict: bool,
+}
+
+/// What a frame looks like, and how accurate it is.
+#[derive(Debug, Args)]
+pub struct ImageArgs {
+    /// Accuracy of the frames that are not key frames.
+    #[arg(short, long, value_enum, default_value = "half-pixel")]
+    pub quality: QualityArg,
+    /// Image size: 1920x1080, or a share of the scene's own: 50% [default: the scene's, else 1280x720].
+    #[arg(short, long)]
+    pub resolution: Option<String>,
+    /// Longest segment in frames, or auto.
+    #[arg(long, default_value = "auto")]
+    pub segment: String,
+    /// Threads for everything, encoding included [default: all].
+    #[arg(short = 'j', long)]
+    pub threads: Option<usize>,
+}
+
+#[derive(Debug, Args)]
+pub struct OutputArgs {
+    /// Frames: 1-100, 1-100x2, 1-10,20-30, -3--1 [default: the scene's own range].
+    #[arg(short, long, allow_hyphen_values = true)]
+    pub frames: Option<String>,
+    /// Render only this part: x,y,width,height in pixels of the full frame.
+    #[arg(long)]
+    pub crop: Option<String>,
+    /// Colour and alpha are 0 where only the world is seen.
+    #[arg(long)]
+    pub transparent: bool,
+    /// Stops applied to the colour channels.
+    #[arg(long, default_value_t = 0.0, allow_negative_numbers = true)]
+    pub exposure: f32,
+    /// Depth of reflection and refraction.
+    #[arg(long, default_value_t = 4)]
+    pub bounces: u32,
+    /// Cast a ray to every reused sample and report how many are hidden (slow).
+    #[arg(long)]
+    pub audit: bool,
+    /// Layers beside the beauty: depth class normal position motion object diffuse specular emission lights, by
+    /// commas; or all, or beauty.
+    #[arg(long, default_value = "depth,class")]
+    pub aov: String,
+    /// Compression of the EXR files.
+    #[arg(long, value_enum, default_value = "zip")]
+    pub compression: CompressionArg,
+    /// File names: %04d or #### stands for the frame number [default: <stem>.%04d.exr].
+    #[arg(long, value_name = "PATTERN")]
+    pub name: Option<String>,
+    /// Keep the frames that are there and complete; render the others.
+    #[arg(long, conflicts_with = "overwrite")]
+    pub skip_existing: bool,
+    /// Replace the frames that are there.
+    #[arg(long)]
+    pub overwrite: bool,
+    /// Where to write the report [default: report.json in the output folder].
+    #[arg(long, value_name = "FILE")]
+    pub report: Option<PathBuf>,
+    /// How to show progress.
+    #[arg(long, value_enum, default_value = "auto")]
+    pub progress: ProgressArg,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum Format {
+    Text,
+    Json,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum QualityArg {
+    /// Every frame traced.
+    Full,
+    /// The paper's guarantee: every reused sample lies inside its pixel.
+    HalfPixel,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum CompressionArg {
+    None,
+    Rle,
+    Zips,
+    Zip,
+    Piz,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum ProgressArg {
+    /// A bar on a terminal, lines otherwise.
+    Auto,
+    Bar,
+    Plain,
+    /// Open Job Description's messages.
+    Openjd,
+    None,
+}

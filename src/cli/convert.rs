@@ -1,0 +1,247 @@
+//! `buzz-convert INPUT OUT_DIR`: the main job.
+
+use super::args::{CompressionArg, ConvertArgs};
+use super::interrupt;
+use super::job::{Job, stem, warn_of_ignored};
+use super::parse;
+use super::progress::{Progress, Tally};
+use anyhow::Result;
+use buzz::error::Error;
+use buzz::frame::{FrameKind, FrameStats};
+use buzz::infer::BuzzBuffer;
+use buzz::output::{
+    self, Compression, ExrSink, FileOptions, FrameFile, FrameRecord, KeyFrame, NamePattern, OutputFolder,
+    Report, ReportInput, RunSeconds, SceneSummary, SegmentRange, SettingsHash, SettingsHasher, peak_bytes,
+};
+use buzz::plan::Plan;
+use buzz::scene::Requirements;
+use buzz::sequence::{FrameSink, Observer, render_sequence};
+use std::collections::BTreeSet;
+use std::path::Path;
+use std::process::ExitCode;
+use std::time::Instant;
+
+pub fn run(args: ConvertArgs) -> Result<ExitCode> {
+    let start = Instant::now();
+    let (Some(input), Some(out_dir)) = (&args.input, &args.out_dir) else {
+        return Err(Error::Usage("INPUT and OUT_DIR are missing".into()).into());
+    };
+    let signal = interrupt::watch()?;
+    let names =
+        NamePattern::parse(args.output.name.as_deref().unwrap_or(NamePattern::DEFAULT), &stem(input))?;
+    let asked = args.output.frames.as_deref().map(parse::frames).transpose()?;
+    let mut job = Job::new(input, &args.scene, &args.image)?;
+    warn_of_ignored(&job.scene);
+    choose_image(&mut job, &args)?;
+    let timing = job.scene.timing;
+    let frames = asked.unwrap_or_else(|| (timing.first..=timing.last).collect());
+
+    let hash = settings_hash(&job, &args);
+    let folder = OutputFolder::open(out_dir, names, frames.iter().copied())?;
+    if !folder.is_locked() {
+        let path = folder.path().display();
+        eprintln!(
+            "buzz-convert: warning: {path}: the file system has no locks: do not run twice on the same frames"
+        );
+    }
+    let skipped = existing(&folder, &frames, &hash, &args)?;
+    let to_render: BTreeSet<i64> =
+        frames.difference(&skipped.iter().map(|r| r.number).collect()).copied().collect();
+
+    let planning = Instant::now();
+    let plan = job.plan();
+    let plan_seconds = planning.elapsed().as_secs_f64();
+
+    let options = FileOptions {
+        compression: compression(args.output.compression),
+        fps: timing.fps,
+        quality: job.quality.name().into(),
+        settings_hash: hash,
+    };
+    let mut sink = ExrSink::new(folder, options)?;
+    let pixels = job.settings.window.pixels() as u64;
+    let progress = Progress::new(args.output.progress, to_render.len(), pixels, signal);
+    let mut recorder = Recorder { progress, records: skipped };
+    let Job { scene, accel, settings, .. } = &mut job;
+    let rendered = render_sequence(scene, accel, settings, &plan, &to_render, &mut sink, &mut recorder);
+    // Frames that are under way are still written, whatever stopped the run.
+    let written = sink.finish();
+    recorder.progress.finish();
+    rendered?;
+    let mut records = recorder.records;
+    for (number, seconds) in written? {
+        if let Some(record) = records.iter_mut().find(|r| r.number == number) {
+            record.stats.seconds.write = seconds.write;
+        }
+    }
+    records.sort_by_key(|r| r.number);
+    for (frame, values) in sink.repaired() {
+        eprintln!(
+            "buzz-convert: warning: frame {frame}: {values} values were not finite or too large for their channel and were replaced"
+        );
+    }
+
+    let seconds = RunSeconds {
+        import: job.import_seconds,
+        accel: job.accel_seconds,
+        plan: plan_seconds,
+        wall: start.elapsed().as_secs_f64(),
+    };
+    let report = report(input, &job, &plan, records, seconds);
+    let whole = frames == (timing.first..=timing.last).collect();
+    let path = args.output.report.clone().unwrap_or_else(|| out_dir.join(report_name(&frames, whole)));
+    report.write_json(&path)?;
+    report.write_html(&path.with_extension("html"))?;
+    summarise(&report);
+    Ok(ExitCode::SUCCESS)
+}
+
+/// Resolves what depends on the image's size.
+fn choose_image(job: &mut Job, args: &ConvertArgs) -> Result<()> {
+    let settings = &mut job.settings;
+    if let Some(text) = &args.output.crop {
+        settings.window = parse::crop(text, (settings.width, settings.height))?;
+    }
+    if !args.output.exposure.is_finite() {
+        return Err(
+            Error::Usage(format!("--exposure {}: expected a number of stops", args.output.exposure)).into()
+        );
+    }
+    settings.aovs = parse::aovs(&args.output.aov)?;
+    settings.transparent = args.output.transparent;
+    settings.exposure = args.output.exposure;
+    settings.bounces = args.output.bounces;
+    settings.audit = args.output.audit;
+    Ok(())
+}
+
+/// Identifies everything that decides the pixels: the scene as read, the settings, and the program's version.
+fn settings_hash(job: &Job, args: &ConvertArgs) -> SettingsHash {
+    let mut hasher = SettingsHasher::new();
+    let mut settings = job.settings.clone();
+    settings.audit = false;
+    hasher.feed("version", env!("CARGO_PKG_VERSION"));
+    hasher.feed("settings", format!("{settings:?}"));
+    hasher.feed("quality", job.quality.name());
+    hasher.feed("segment", job.longest_segment.to_le_bytes());
+    hasher.feed("compression", format!("{:?}", args.output.compression));
+    job.scene.digest(&mut |name, bytes| {
+        hasher.feed(name, bytes);
+    });
+    hasher.finish()
+}
+
+/// Frames that are there already and may stay; an error if some are there and nothing says what to do with them.
+fn existing(
+    folder: &OutputFolder,
+    frames: &BTreeSet<i64>,
+    hash: &SettingsHash,
+    args: &ConvertArgs,
+) -> Result<Vec<FrameRecord>> {
+    let mut kept = Vec::new();
+    for &number in frames {
+        if args.output.skip_existing {
+            if let FrameFile::Complete(stats, kind) = folder.check(number, hash) {
+                kept.push(FrameRecord { number, kind, stats, skipped: true });
+            }
+        } else if !args.output.overwrite && folder.file_of(number).exists() {
+            let message = "is there already; give --skip-existing to keep finished frames, or --overwrite to replace them";
+            return Err(Error::output(folder.file_of(number), message).into());
+        }
+    }
+    Ok(kept)
+}
+
+fn compression(compression: CompressionArg) -> Compression {
+    match compression {
+        CompressionArg::None => Compression::None,
+        CompressionArg::Rle => Compression::Rle,
+        CompressionArg::Zips => Compression::Zips,
+        CompressionArg::Zip => Compression::Zip,
+        CompressionArg::Piz => Compression::Piz,
+    }
+}
+
+/// `report.json`, or one of its own for a part of the range, so that several runs may share a folder.
+fn report_name(frames: &BTreeSet<i64>, whole: bool) -> String {
+    match (frames.first(), frames.last()) {
+        (Some(first), Some(last)) if !whole => format!("report.{first}-{last}.json"),
+        _ => "report.json".into(),
+    }
+}
+
+/// Keeps what each frame took, and passes it on to be shown.
+struct Recorder {
+    progress: Progress,
+    records: Vec<FrameRecord>,
+}
+
+impl Observer for Recorder {
+    fn frame_done(&mut self, number: i64, kind: FrameKind, stats: &FrameStats, wanted: bool) {
+        if wanted {
+            self.records.push(FrameRecord { number, kind, stats: *stats, skipped: false });
+        }
+        self.progress.frame_done(number, kind, stats, wanted);
+    }
+
+    fn stop_requested(&self) -> Option<i32> {
+        self.progress.stop_requested()
+    }
+}
+
+fn report(input: &Path, job: &Job, plan: &Plan, frames: Vec<FrameRecord>, seconds: RunSeconds) -> Report {
+    let scene = &job.scene;
+    let keyframes =
+        plan.keyframes.iter().map(|k| KeyFrame { frame: k.frame, reason: k.reason.name().into() });
+    let segments = plan.segments.iter().map(|s| SegmentRange { key: s.key, first: s.first, last: s.last });
+    Report::new(ReportInput {
+        input: input.display().to_string(),
+        settings: output::Settings {
+            quality: job.quality.name().into(),
+            width: job.settings.width,
+            height: job.settings.height,
+            fps: output::Settings::fps(scene.timing.fps),
+            threads: job.threads,
+            aa: 1,
+        },
+        scene: SceneSummary {
+            triangles: scene.triangle_count(),
+            shapes: 0,
+            instances: scene.instances.len(),
+            lights: scene.lights.len(),
+            requires: Requirements::of(scene).names().iter().map(|&n| n.into()).collect(),
+            ignored: scene.ignored.iter().map(Into::into).collect(),
+            bytes_per_pixel: BuzzBuffer::bytes_per_pixel(scene.lights.len()),
+        },
+        plan: output::Plan {
+            keyframes: keyframes.collect(),
+            segments: segments.collect(),
+            cuts: plan.cuts.clone(),
+        },
+        frames,
+        seconds,
+        peak_bytes: peak_bytes(),
+        warnings: Vec::new(),
+    })
+}
+
+/// Three lines: frames, rays saved, where the time went.
+fn summarise(report: &Report) {
+    let totals = &report.totals;
+    println!(
+        "{} frames: {} traced, {} inferred, in {:.1} s",
+        totals.frames, totals.traced_frames, totals.inferred_frames, totals.seconds.wall
+    );
+    let mut tally = Tally::default();
+    for frame in &report.frames {
+        tally.add(frame.from.map_or(FrameKind::Traced, |from| FrameKind::Inferred { from }), frame.rays);
+    }
+    let saved = tally.saved().map(|s| format!("{:.1} % of camera and shadow rays saved", 100.0 * s));
+    let hidden = totals.hidden.map(|h| format!("; {h} reused samples hidden")).unwrap_or_default();
+    println!("{}{hidden}", saved.unwrap_or_else(|| "no frame was traced in this run".into()));
+    let s = &totals.seconds;
+    println!(
+        "seconds: {:.1} reading, {:.1} trees, {:.1} plan, {:.1} infer, {:.1} trace, {:.1} enhance, {:.1} write (beside)",
+        s.import, s.accel, s.plan, s.infer, s.trace, s.enhance, s.write
+    );
+}

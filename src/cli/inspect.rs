@@ -1,0 +1,135 @@
+//! `buzz-convert inspect`: what the scene holds, what it requires, what will be ignored.
+
+use super::args::{Format, InspectArgs};
+use super::job;
+use anyhow::Result;
+use buzz::infer::BuzzBuffer;
+use buzz::scene::{Interpolation, LightKind, Projection, Requirements, Scene, Target};
+use serde_json::{Value, json};
+use std::process::ExitCode;
+
+pub fn run(args: InspectArgs) -> Result<ExitCode> {
+    let scene = job::read(&args.input, &args.scene)?;
+    match args.format {
+        Format::Json => println!("{}", serde_json::to_string_pretty(&as_json(&scene))?),
+        Format::Text => print!("{}", as_text(&scene)),
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+/// Stages that rendering the scene runs.
+fn stages(needs: &Requirements) -> Vec<&'static str> {
+    let mut stages = vec!["trace", "project", "obscured", "entering", "creeping"];
+    let enhance = [
+        (needs.textures, "texture"),
+        (true, "highlights"),
+        (needs.reflection, "reflection"),
+        (needs.refraction, "refraction"),
+    ];
+    stages.extend(enhance.into_iter().filter_map(|(needed, name)| needed.then_some(name)));
+    stages
+}
+
+fn as_json(scene: &Scene) -> Value {
+    let needs = Requirements::of(scene);
+    let cameras = scene.cameras.iter().map(|c| match c.lens.projection {
+        Projection::Perspective { yfov } => json!({"name": c.name, "type": "perspective", "yfov": yfov}),
+        Projection::Orthographic { ymag, .. } => {
+            json!({"name": c.name, "type": "orthographic", "ymag": ymag})
+        }
+    });
+    let lights = scene.lights.iter().map(|l| json!({"name": l.name, "type": light_kind(&l.kind)}));
+    let animations = scene.channels.iter().map(|c| {
+        let (property, of) = target(scene, c.target);
+        json!({"property": property, "of": of, "keys": c.curve.times.len(), "interpolation": interpolation(c.curve.interpolation)})
+    });
+    let ignored =
+        scene.ignored.iter().map(|i| json!({"feature": i.feature, "where": i.place, "effect": i.effect}));
+    let timing = &scene.timing;
+    json!({
+        "schema": "buzz-scene/1",
+        "triangles": scene.triangle_count(),
+        "shapes": 0,
+        "instances": scene.instances.len(),
+        "cameras": cameras.collect::<Vec<_>>(),
+        "lights": lights.collect::<Vec<_>>(),
+        "animations": animations.collect::<Vec<_>>(),
+        "requires": needs.names(),
+        "ignored": ignored.collect::<Vec<_>>(),
+        "bytes_per_pixel": BuzzBuffer::bytes_per_pixel(scene.lights.len()),
+        "stages": stages(&needs),
+        "fps": [timing.fps.numerator, timing.fps.denominator],
+        "frames": [timing.first, timing.last],
+        "resolution": timing.resolution,
+    })
+}
+
+fn as_text(scene: &Scene) -> String {
+    let needs = Requirements::of(scene);
+    let timing = &scene.timing;
+    let mut text = format!(
+        "{} triangles in {} instances, {} materials, {} images, {} lights, {} cameras\n",
+        scene.triangle_count(),
+        scene.instances.len(),
+        scene.materials.len(),
+        scene.images.len(),
+        scene.lights.len(),
+        scene.cameras.len()
+    );
+    text += &format!("frames {}-{} at {:.3} a second\n", timing.first, timing.last, timing.fps.value());
+    for (i, camera) in scene.cameras.iter().enumerate() {
+        text += &format!("camera {i}: {}\n", camera.name);
+    }
+    for light in &scene.lights {
+        text += &format!("light: {} ({})\n", light.name, light_kind(&light.kind));
+    }
+    let names = needs.names();
+    let names = if names.is_empty() { "nothing special".into() } else { names.join(", ") };
+    text += &format!("requires: {names}\nstages: {}\n", stages(&needs).join(", "));
+    text += &format!("bytes a pixel: {}\n", BuzzBuffer::bytes_per_pixel(scene.lights.len()));
+    for ignored in &scene.ignored {
+        text += &format!("ignored: {} at {}: {}\n", ignored.feature, ignored.place, ignored.effect);
+    }
+    text
+}
+
+fn light_kind(kind: &LightKind) -> &'static str {
+    match kind {
+        LightKind::Point => "point",
+        LightKind::Spot { .. } => "spot",
+        LightKind::Directional => "directional",
+    }
+}
+
+fn interpolation(interpolation: Interpolation) -> &'static str {
+    match interpolation {
+        Interpolation::Linear => "LINEAR",
+        Interpolation::Step => "STEP",
+        Interpolation::CubicSpline => "CUBICSPLINE",
+    }
+}
+
+/// A property's name, and the name of what has it.
+fn target(scene: &Scene, target: Target) -> (&'static str, &str) {
+    let node = |n: usize| scene.nodes[n].name.as_str();
+    let camera = |c: usize| scene.cameras[c].name.as_str();
+    let light = |l: usize| scene.lights[l].name.as_str();
+    match target {
+        Target::Translation(n) => ("translation", node(n)),
+        Target::Rotation(n) => ("rotation", node(n)),
+        Target::Scale(n) => ("scale", node(n)),
+        Target::Weights(n) => ("weights", node(n)),
+        Target::Visible(n) => ("visible", node(n)),
+        Target::CameraYfov(c) => ("yfov", camera(c)),
+        Target::CameraXmag(c) => ("xmag", camera(c)),
+        Target::CameraYmag(c) => ("ymag", camera(c)),
+        Target::CameraNear(c) => ("znear", camera(c)),
+        Target::CameraFar(c) => ("zfar", camera(c)),
+        Target::CameraShift(c) => ("shift", camera(c)),
+        Target::LightColor(l) => ("color", light(l)),
+        Target::LightIntensity(l) => ("intensity", light(l)),
+        Target::LightRange(l) => ("range", light(l)),
+        Target::LightInnerCone(l) => ("innerConeAngle", light(l)),
+        Target::LightOuterCone(l) => ("outerConeAngle", light(l)),
+    }
+}

@@ -1,0 +1,131 @@
+//! Arguments as meant: the scene read, the camera chosen, sizes and ranges resolved.
+
+use super::args::{ImageArgs, QualityArg, SceneArgs};
+use super::parse;
+use anyhow::{Context, Result};
+use buzz::accel::Accel;
+use buzz::error::Error;
+use buzz::import::{ImportOptions, import};
+use buzz::plan::{Plan, PlanOptions, plan};
+use buzz::scene::Scene;
+use buzz::sequence::{Quality, Settings, camera_path};
+use std::path::Path;
+use std::time::Instant;
+
+/// A scene that is ready to be planned or rendered.
+pub struct Job {
+    pub scene: Scene,
+    pub accel: Accel,
+    pub quality: Quality,
+    pub longest_segment: u32,
+    pub settings: Settings,
+    pub threads: usize,
+    /// Seconds that reading the scene took.
+    pub import_seconds: f64,
+    /// Seconds that building its trees took.
+    pub accel_seconds: f64,
+}
+
+impl Job {
+    /// Reads the scene and resolves the options.
+    pub fn new(input: &Path, scene_args: &SceneArgs, image: &ImageArgs) -> Result<Self> {
+        let threads = use_threads(image.threads)?;
+        let longest_segment = parse::segment(&image.segment)?;
+        let start = Instant::now();
+        let mut scene = read(input, scene_args)?;
+        let import_seconds = start.elapsed().as_secs_f64();
+        require_camera(&scene, input)?;
+        if let Some(first) = scene_args.start_frame {
+            renumber(&mut scene, first);
+        }
+        let own = scene.timing.resolution.unwrap_or((1280, 720));
+        let (width, height) =
+            image.resolution.as_deref().map_or(Ok(own), |text| parse::resolution(text, own))?;
+        let mut settings = Settings::new(width, height);
+        settings.camera = scene_args.camera.as_deref().map(|name| find_camera(&scene, name)).transpose()?;
+        let start = Instant::now();
+        let accel = Accel::new(&scene);
+        let accel_seconds = start.elapsed().as_secs_f64();
+        let quality = match image.quality {
+            QualityArg::Full => Quality::Full,
+            QualityArg::HalfPixel => Quality::HalfPixel,
+        };
+        Ok(Self { scene, accel, quality, longest_segment, settings, threads, import_seconds, accel_seconds })
+    }
+
+    /// Plans the scene's own range.
+    pub fn plan(&mut self) -> Plan {
+        let path = camera_path(&self.scene, &mut self.accel, &self.settings);
+        let full = self.quality == Quality::Full;
+        let cuts: Vec<i64> = match self.settings.camera {
+            Some(_) => Vec::new(),
+            None => self.scene.cuts.iter().map(|c| c.frame).collect(),
+        };
+        plan(&path, &cuts, PlanOptions { full, longest_segment: self.longest_segment })
+    }
+}
+
+/// Reads the scene and warns of what it will not show.
+pub fn read(input: &Path, args: &SceneArgs) -> Result<Scene> {
+    let options = ImportOptions {
+        fps: args.fps.as_deref().map(parse::fps).transpose()?,
+        geometry: args.geometry.clone(),
+        camera_from: args.camera_from.clone(),
+        turntable: args.turntable,
+        strict: args.strict,
+    };
+    Ok(import(input, &options)?)
+}
+
+/// Says once what of the scene is not rendered.
+pub fn warn_of_ignored(scene: &Scene) {
+    for ignored in &scene.ignored {
+        eprintln!(
+            "buzz-convert: warning: {}: {} is not rendered: {}",
+            ignored.place, ignored.feature, ignored.effect
+        );
+    }
+}
+
+/// The stem of the input's name, for the frames' names.
+pub fn stem(input: &Path) -> String {
+    input.file_stem().map_or_else(|| "frame".to_owned(), |s| s.to_string_lossy().into_owned())
+}
+
+fn use_threads(threads: Option<usize>) -> Result<usize> {
+    if threads == Some(0) {
+        return Err(Error::Usage("--threads 0: expected at least 1".into()).into());
+    }
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads.unwrap_or(0));
+    pool.build_global().context("the threads could not be started")?;
+    Ok(rayon::current_num_threads())
+}
+
+fn require_camera(scene: &Scene, input: &Path) -> Result<()> {
+    if scene.cameras.is_empty() {
+        let message = "the file has no camera; export one, or give --turntable FRAMES for an orbit";
+        return Err(Error::input(input, "/cameras", message).into());
+    }
+    Ok(())
+}
+
+fn renumber(scene: &mut Scene, first: i64) {
+    let shift = first - scene.timing.first;
+    let timing = &mut scene.timing;
+    for number in [&mut timing.frame_start, &mut timing.first, &mut timing.last] {
+        *number += shift;
+    }
+    for cut in &mut scene.cuts {
+        cut.frame += shift;
+    }
+}
+
+fn find_camera(scene: &Scene, name: &str) -> Result<usize> {
+    let by_name = scene.cameras.iter().position(|c| c.name == name);
+    let by_index = || name.parse::<usize>().ok().filter(|&i| i < scene.cameras.len());
+    by_name.or_else(by_index).ok_or_else(|| {
+        let names: Vec<String> =
+            scene.cameras.iter().enumerate().map(|(i, c)| format!("{i} {}", c.name)).collect();
+        Error::Usage(format!("--camera {name}: the scene has {}", names.join(", "))).into()
+    })
+}

@@ -1,0 +1,191 @@
+//! The small languages of option values: frame ranges, sizes, rates.
+
+use buzz::error::{Error, Result};
+use buzz::frame::{Aov, AovSet, Window};
+use buzz::scene::Rational;
+use std::collections::BTreeSet;
+
+/// More frames than anyone renders in one run; a typo in a range must not fill the memory.
+const MOST_FRAMES: i64 = 1_000_000;
+
+fn usage(option: &str, text: &str, wanted: &str) -> Error {
+    Error::Usage(format!("{option} {text}: expected {wanted}"))
+}
+
+/// `1-100`, `1-100x2`, `1-7:2`, `1-10,20-30`, `7-7`, `7`, `-3--1`.
+pub fn frames(text: &str) -> Result<BTreeSet<i64>> {
+    let error = || usage("--frames", text, "ranges like 1-100, 1-100x2 or 1-10,20-30, first to last");
+    let mut found = BTreeSet::new();
+    for part in text.split(',') {
+        let (range, step) = match part.split_once(['x', ':']) {
+            Some((range, step)) => {
+                (range, step.trim().parse::<i64>().ok().filter(|&s| s > 0).ok_or_else(error)?)
+            }
+            None => (part, 1),
+        };
+        let range = range.trim();
+        // The dash that divides is the first one after a digit; any other is a sign.
+        let dash = range
+            .char_indices()
+            .skip(1)
+            .find(|&(i, c)| c == '-' && range[..i].ends_with(|c: char| c.is_ascii_digit()));
+        let (first, last) = match dash {
+            Some((i, _)) => (&range[..i], &range[i + 1..]),
+            None => (range, range),
+        };
+        let number = |s: &str| s.trim().parse::<i64>().map_err(|_| error());
+        let (first, last) = (number(first)?, number(last)?);
+        let length = last.checked_sub(first).filter(|&l| l >= 0).ok_or_else(error)?;
+        if length / step >= MOST_FRAMES {
+            return Err(usage("--frames", text, &format!("at most {MOST_FRAMES} frames")));
+        }
+        found.extend((0..=length / step).map(|i| first + i * step));
+    }
+    Ok(found)
+}
+
+/// `24`, `23.976`, `24000/1001`. The decimal names of NTSC rates mean the exact ratios.
+pub fn fps(text: &str) -> Result<Rational> {
+    let error = || usage("--fps", text, "a rate like 24, 23.976 or 24000/1001");
+    if let Some((numerator, denominator)) = text.split_once('/') {
+        let part = |s: &str| s.trim().parse::<u32>().ok().filter(|&n| n > 0).ok_or_else(error);
+        return Ok(Rational { numerator: part(numerator)?, denominator: part(denominator)? });
+    }
+    let rate: f64 = text.trim().parse().map_err(|_| error())?;
+    if !(rate > 0.0 && rate <= 100_000.0) {
+        return Err(error());
+    }
+    let ntsc = Rational { numerator: (rate.round() * 1000.0) as u32, denominator: 1001 };
+    if rate.fract() != 0.0 && (ntsc.value() - rate).abs() < 0.005 {
+        return Ok(ntsc);
+    }
+    let scale = if rate.fract() == 0.0 { 1 } else { 1000 };
+    Ok(Rational { numerator: (rate * f64::from(scale)).round() as u32, denominator: scale })
+}
+
+/// Longest side that is accepted.
+const MOST_PIXELS_A_SIDE: u32 = 65_536;
+
+/// `1920x1080`, or `50%` of `own`.
+pub fn resolution(text: &str, own: (u32, u32)) -> Result<(u32, u32)> {
+    let error = || usage("--resolution", text, "a size like 1920x1080, or a share like 50%");
+    let size = if let Some(percent) = text.strip_suffix('%') {
+        let share = percent.trim().parse::<f64>().map_err(|_| error())? / 100.0;
+        let side = |s: u32| (f64::from(s) * share).round() as u32;
+        (side(own.0), side(own.1))
+    } else {
+        let (width, height) = text.split_once(['x', 'X']).ok_or_else(error)?;
+        let side = |s: &str| s.trim().parse::<u32>().map_err(|_| error());
+        (side(width)?, side(height)?)
+    };
+    let fits = |s: u32| (1..=MOST_PIXELS_A_SIDE).contains(&s);
+    // Pixel numbers are 32 bits wide in the Buzzbuffer.
+    let countable = u64::from(size.0) * u64::from(size.1) < u64::from(u32::MAX);
+    if fits(size.0) && fits(size.1) && countable { Ok(size) } else { Err(error()) }
+}
+
+/// `x,y,width,height` inside `full`.
+pub fn crop(text: &str, full: (u32, u32)) -> Result<Window> {
+    let error = || usage("--crop", text, &format!("x,y,width,height inside {}x{}", full.0, full.1));
+    let numbers =
+        text.split(',').map(|s| s.trim().parse::<u32>().map_err(|_| error())).collect::<Result<Vec<_>>>()?;
+    let &[x, y, width, height] = numbers.as_slice() else { return Err(error()) };
+    let fits =
+        |at: u32, size: u32, full: u32| size > 0 && at.checked_add(size).is_some_and(|end| end <= full);
+    if fits(x, width, full.0) && fits(y, height, full.1) {
+        Ok(Window { x, y, width, height })
+    } else {
+        Err(error())
+    }
+}
+
+/// A comma list of layers.
+pub fn aovs(text: &str) -> Result<AovSet> {
+    const NAMES: [(&str, Aov); 10] = [
+        ("depth", Aov::Depth),
+        ("class", Aov::Class),
+        ("normal", Aov::Normal),
+        ("position", Aov::Position),
+        ("motion", Aov::Motion),
+        ("object", Aov::Object),
+        ("diffuse", Aov::Diffuse),
+        ("specular", Aov::Specular),
+        ("emission", Aov::Emission),
+        ("lights", Aov::Lights),
+    ];
+    let mut set = AovSet::default();
+    for name in text.split(',').map(str::trim) {
+        match (name, NAMES.iter().find(|(n, _)| *n == name)) {
+            (_, Some((_, aov))) => set = set.with(*aov),
+            ("all", _) => set = NAMES.iter().map(|(_, aov)| *aov).collect(),
+            ("beauty", _) => {}
+            _ => {
+                let names: Vec<&str> = NAMES.iter().map(|(n, _)| *n).collect();
+                return Err(usage("--aov", name, &format!("one of {}, all, beauty", names.join(", "))));
+            }
+        }
+    }
+    Ok(set)
+}
+
+/// `auto` or a number of frames.
+pub fn segment(text: &str) -> Result<u32> {
+    match text {
+        "auto" => Ok(buzz::plan::LONGEST_SEGMENT),
+        _ => text
+            .parse()
+            .ok()
+            .filter(|&n| n > 0)
+            .ok_or_else(|| usage("--segment", text, "auto or a number of frames")),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn frame_ranges_as_farms_write_them() {
+        let list = |text| frames(text).unwrap().into_iter().collect::<Vec<_>>();
+        assert_eq!(list("1-4"), [1, 2, 3, 4]);
+        assert_eq!(list("1-7x2"), [1, 3, 5, 7]);
+        assert_eq!(list("1-7:3"), [1, 4, 7]);
+        assert_eq!(list("-3--1"), [-3, -2, -1]);
+        assert_eq!(list("-1-1"), [-1, 0, 1]);
+        assert_eq!(list("7-7"), [7]);
+        assert_eq!(list("4,5,20"), [4, 5, 20]);
+        assert_eq!(list("1-2,10-11"), [1, 2, 10, 11]);
+        for bad in ["", "a", "5-1", "1-5x0", "1--", "1-99999999999", "--", "1-5x"] {
+            assert!(frames(bad).is_err(), "{bad}");
+        }
+    }
+
+    #[test]
+    fn decimal_ntsc_rates_are_exact() {
+        for (text, n, d) in [
+            ("24", 24, 1),
+            ("23.976", 24000, 1001),
+            ("29.97", 30000, 1001),
+            ("24000/1001", 24000, 1001),
+            ("12.5", 12500, 1000),
+        ] {
+            assert_eq!(fps(text).unwrap(), Rational { numerator: n, denominator: d });
+        }
+        for bad in ["0", "-1", "24/0", "x", "nan", "inf"] {
+            assert!(fps(bad).is_err(), "{bad}");
+        }
+    }
+
+    #[test]
+    fn sizes_and_windows_must_fit() {
+        assert_eq!(resolution("50%", (1280, 720)).unwrap(), (640, 360));
+        assert_eq!(resolution("16384x16", (1, 1)).unwrap(), (16384, 16));
+        for bad in ["0x5", "5", "x", "0%", "-5%", "99999999x1", "65536x65536", "nan%"] {
+            assert!(resolution(bad, (1280, 720)).is_err(), "{bad}");
+        }
+        assert!(crop("0,0,1280,720", (1280, 720)).is_ok());
+        for bad in ["0,0,1281,720", "1,0,1280,1", "0,0,0,1", "0,0,1", "4294967295,0,1,1"] {
+            assert!(crop(bad, (1280, 720)).is_err(), "{bad}");
+        }
+    }
+}

@@ -1,0 +1,86 @@
+//! `buzz-convert plan`: what would be rendered, and why.
+
+use super::args::{Format, PlanArgs};
+use super::job::{Job, warn_of_ignored};
+use anyhow::Result;
+use buzz::frame::FrameKind;
+use buzz::plan::Plan;
+use buzz::scene::Projection;
+use serde_json::{Value, json};
+use std::process::ExitCode;
+
+pub fn run(args: PlanArgs) -> Result<ExitCode> {
+    let mut job = Job::new(&args.input, &args.scene, &args.image)?;
+    warn_of_ignored(&job.scene);
+    let plan = job.plan();
+    match args.format {
+        Format::Json => println!("{}", serde_json::to_string_pretty(&as_json(&job, &plan))?),
+        Format::Text => print!("{}", as_text(&plan)),
+    }
+    Ok(ExitCode::SUCCESS)
+}
+
+fn as_json(job: &Job, plan: &Plan) -> Value {
+    let fps = job.scene.timing.fps;
+    let keyframes = plan.keyframes.iter().map(|k| json!({"frame": k.frame, "reason": k.reason.name()}));
+    let segments = plan.segments.iter().map(|s| json!({"key": s.key, "first": s.first, "last": s.last}));
+    json!({
+        "schema": "buzz-plan/1",
+        "fps": [fps.numerator, fps.denominator],
+        "frames": plan.frames.iter().map(|f| frame_as_json(job, f)).collect::<Vec<_>>(),
+        "keyframes": keyframes.collect::<Vec<_>>(),
+        "segments": segments.collect::<Vec<_>>(),
+        "cuts": plan.cuts,
+    })
+}
+
+fn frame_as_json(job: &Job, planned: &buzz::plan::PlannedFrame) -> Value {
+    let scene = &job.scene;
+    let time = scene.timing.time_of(planned.frame);
+    let pose = scene.pose(time);
+    let camera = scene.camera_at(planned.frame, job.settings.camera);
+    let view = scene.view(&pose, camera, job.settings.width, job.settings.height);
+    // glTF's camera looks along -Z, so the third column is where it looks away from.
+    let columns =
+        [view.right.extend(0.0), view.up.extend(0.0), (-view.forward).extend(0.0), view.eye.extend(1.0)];
+    let matrix: Vec<f64> = columns.iter().flat_map(|c| c.to_array()).collect();
+    let (yfov, ymag) = match view.lens.projection {
+        Projection::Perspective { yfov } => (Some(yfov), None),
+        Projection::Orthographic { ymag, .. } => (None, Some(ymag)),
+    };
+    let (kind, from) = match planned.kind {
+        FrameKind::Traced => ("traced", None),
+        FrameKind::Inferred { from } => ("inferred", Some(from)),
+    };
+    json!({
+        "frame": planned.frame, "time": time, "camera": scene.cameras[camera].name, "world_from_camera": matrix,
+        "yfov": yfov, "ymag": ymag, "shift": [view.lens.shift.x, view.lens.shift.y],
+        "kind": kind, "from": from, "predicted_traced": planned.predicted_traced,
+    })
+}
+
+fn as_text(plan: &Plan) -> String {
+    let mut text = String::new();
+    for (segment, key) in plan.segments.iter().zip(&plan.keyframes) {
+        let frames: Vec<_> =
+            plan.frames.iter().filter(|f| (segment.first..=segment.last).contains(&f.frame)).collect();
+        let traced: f64 = frames.iter().map(|f| f.predicted_traced).sum::<f64>() / frames.len().max(1) as f64;
+        text += &format!(
+            "frames {:>5}-{:<5} key {:>5} ({}), {:.0} % of pixels traced, predicted\n",
+            segment.first,
+            segment.last,
+            key.frame,
+            key.reason.name(),
+            traced * 100.0
+        );
+    }
+    let traced: f64 = plan.frames.iter().map(|f| f.predicted_traced).sum();
+    text += &format!(
+        "{} frames, {} key frames, {} cuts; {:.0} % of camera rays saved, predicted\n",
+        plan.frames.len(),
+        plan.keyframes.len(),
+        plan.cuts.len(),
+        100.0 * (1.0 - traced / plan.frames.len().max(1) as f64)
+    );
+    text
+}

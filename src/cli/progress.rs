@@ -1,0 +1,140 @@
+//! What an artist sees while it runs, and what stops it.
+
+use super::args::ProgressArg;
+use buzz::frame::{FrameKind, FrameStats, RayCounts};
+use buzz::sequence::Observer;
+use indicatif::{HumanDuration, ProgressBar, ProgressDrawTarget, ProgressStyle};
+use std::io::IsTerminal;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
+use std::time::{Duration, Instant};
+
+/// Counts frames and rays, prints them, and passes on a request to stop.
+pub struct Progress {
+    style: Style,
+    total: usize,
+    done: usize,
+    pixels: u64,
+    tally: Tally,
+    start: Instant,
+    signal: Arc<AtomicUsize>,
+}
+
+enum Style {
+    Bar(ProgressBar),
+    Plain,
+    Openjd,
+    None,
+}
+
+/// Rays of a run, and what tracing every frame would have taken.
+#[derive(Debug, Default, Clone, Copy)]
+pub struct Tally {
+    frames: u64,
+    key_frames: u64,
+    key_rays: u64,
+    rays: RayCounts,
+}
+
+impl Tally {
+    /// Counts a frame.
+    pub fn add(&mut self, kind: FrameKind, rays: RayCounts) {
+        self.frames += 1;
+        self.rays += rays;
+        if kind == FrameKind::Traced {
+            self.key_frames += 1;
+            self.key_rays += rays.primary_and_shadow();
+        }
+    }
+
+    /// Share of camera and shadow rays saved, if the other frames need as many as the key frames do.
+    pub fn saved(&self) -> Option<f64> {
+        let full = self.key_rays as f64 / self.key_frames as f64 * self.frames as f64;
+        (full > 0.0).then(|| 1.0 - self.rays.primary_and_shadow() as f64 / full)
+    }
+}
+
+impl Progress {
+    /// Progress of `total` frames of `pixels` pixels; `signal` holds the number of a signal that came.
+    pub fn new(style: ProgressArg, total: usize, pixels: u64, signal: Arc<AtomicUsize>) -> Self {
+        let style = match style {
+            ProgressArg::Auto if std::io::stderr().is_terminal() => Style::Bar(bar(total)),
+            ProgressArg::Bar => Style::Bar(bar(total)),
+            ProgressArg::Auto | ProgressArg::Plain => Style::Plain,
+            ProgressArg::Openjd => Style::Openjd,
+            ProgressArg::None => Style::None,
+        };
+        Self { style, total, done: 0, pixels, tally: Tally::default(), start: Instant::now(), signal }
+    }
+
+    /// Leaves the terminal as it was.
+    pub fn finish(&self) {
+        if let Style::Bar(bar) = &self.style {
+            bar.finish_and_clear();
+        }
+    }
+
+    fn left(&self) -> Duration {
+        let each = self.start.elapsed().as_secs_f64() / self.done.max(1) as f64;
+        Duration::from_secs_f64(each * self.total.saturating_sub(self.done) as f64)
+    }
+
+    fn say(&self, number: i64, kind: FrameKind, stats: &FrameStats) {
+        let saved =
+            self.tally.saved().map(|s| format!("{:.1} % of rays saved", s * 100.0)).unwrap_or_default();
+        let how = match kind {
+            FrameKind::Traced => "traced".to_owned(),
+            FrameKind::Inferred { from } => format!("inferred from {from}"),
+        };
+        let share = 100.0 * stats.rays.primary as f64 / self.pixels.max(1) as f64;
+        match &self.style {
+            Style::Bar(bar) => {
+                bar.set_message(format!("frame {number} {how}, {saved}"));
+                bar.inc(1);
+            }
+            Style::Plain => eprintln!(
+                "frame {number}: {how}, {share:.1} % of pixels traced; {}/{}, {saved}, {} left",
+                self.done,
+                self.total,
+                HumanDuration(self.left())
+            ),
+            Style::Openjd => {
+                println!("openjd_progress: {:.1}", 100.0 * self.done as f64 / self.total.max(1) as f64);
+                println!("openjd_status: frame {number} {how}, {saved}");
+                flush();
+            }
+            Style::None => {}
+        }
+    }
+}
+
+/// A farm reads each line as it comes; a pipe would hold it back. A reader that went away is no error of the frame's.
+fn flush() {
+    let _ = std::io::Write::flush(&mut std::io::stdout());
+}
+
+fn bar(total: usize) -> ProgressBar {
+    let bar = ProgressBar::with_draw_target(Some(total as u64), ProgressDrawTarget::stderr());
+    let template = "{bar:30} {pos}/{len}  {msg}  {eta} left";
+    bar.set_style(ProgressStyle::with_template(template).unwrap_or_else(|_| ProgressStyle::default_bar()));
+    bar.enable_steady_tick(Duration::from_millis(250));
+    bar
+}
+
+impl Observer for Progress {
+    fn frame_done(&mut self, number: i64, kind: FrameKind, stats: &FrameStats, wanted: bool) {
+        if !wanted {
+            return;
+        }
+        self.done += 1;
+        self.tally.add(kind, stats.rays);
+        self.say(number, kind, stats);
+    }
+
+    fn stop_requested(&self) -> Option<i32> {
+        match self.signal.load(Relaxed) {
+            0 => None,
+            signal => Some(signal as i32),
+        }
+    }
+}

@@ -1,0 +1,39 @@
+//! How much memory a file may take: what its size justifies.
+//!
+//! A few bytes of JSON can claim arrays of 2^32 elements, or use one array ten thousand times over. What is taken
+//! is therefore counted and bounded by a multiple of what was read.
+
+use crate::{Error, Result};
+use std::cell::Cell;
+
+/// Bytes that any file may take: the smallest scenes are not worth refusing.
+const FLOOR: usize = 64 << 20;
+/// Bytes of geometry and animation that each byte read may become. An 8-bit triangle strip index becomes 12 bytes;
+/// `EXT_meshopt_compression` packs regular data a hundred times.
+const PER_BYTE: usize = 256;
+
+/// Counts what one file takes.
+pub(super) struct Budget {
+    left: Cell<usize>,
+}
+
+impl Budget {
+    /// A budget for a file and its buffers of `bytes` in all.
+    pub fn new(bytes: usize) -> Self {
+        Self { left: Cell::new(FLOOR.saturating_add(bytes.saturating_mul(PER_BYTE))) }
+    }
+
+    /// Takes `count` things of `size` bytes, or makes an error of `refuse`.
+    pub fn take(&self, count: usize, size: usize, refuse: impl FnOnce(String) -> Error) -> Result<()> {
+        let wanted = count.saturating_mul(size);
+        match self.left.get().checked_sub(wanted) {
+            Some(left) => {
+                self.left.set(left);
+                Ok(())
+            }
+            None => Err(refuse(format!(
+                "needs {wanted} bytes, more than a file of this size can justify; check its counts, or export it again"
+            ))),
+        }
+    }
+}

@@ -1,0 +1,274 @@
+//! Images: found, decoded once each in parallel, and made into mip-mapped textures.
+
+use super::{
+    accessor::Accessors,
+    document::{Document, read_file},
+    ignored::Notes,
+    uri::{self, Source},
+};
+use crate::{
+    Result,
+    scene::{ColorSpace, Image},
+};
+use image::{DynamicImage, ImageReader, Limits};
+use rayon::prelude::*;
+use std::{collections::HashMap, io::Cursor, path::PathBuf};
+
+/// Longest side of an image.
+const MAX_SIDE: u32 = 16384;
+/// Pixels that the images of any file may have in all.
+const PIXELS_FLOOR: usize = 1 << 24;
+/// Pixels for each byte of encoded images: deflate packs flat colour a thousand times.
+const PIXELS_PER_BYTE: usize = 1024;
+
+/// An image as the scene wants it: which, and how its values are meant.
+type Wanted = (usize, ColorSpaceKey);
+
+/// [`ColorSpace`] as part of a key.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+enum ColorSpaceKey {
+    Srgb,
+    Linear,
+}
+
+fn key(space: ColorSpace) -> ColorSpaceKey {
+    match space {
+        ColorSpace::Srgb => ColorSpaceKey::Srgb,
+        ColorSpace::Linear => ColorSpaceKey::Linear,
+    }
+}
+
+/// The images that materials use.
+pub(super) struct Images {
+    /// For the scene.
+    pub images: Vec<Image>,
+    index: HashMap<Wanted, usize>,
+    /// Images of the file that have the bytes of another one.
+    alias: HashMap<usize, usize>,
+}
+
+/// Where an image's bytes come from, to know two images with the same ones.
+#[derive(PartialEq, Eq, Hash)]
+enum Origin {
+    View(usize),
+    File(PathBuf),
+}
+
+impl Images {
+    /// Loads the images that are wanted; those that cannot be had are noted and left out.
+    pub fn load(accessors: Accessors, notes: &Notes, wanted: &[(usize, ColorSpace)]) -> Result<Self> {
+        let document = accessors.document;
+        let mut sources: Vec<usize> = wanted.iter().map(|w| w.0).collect();
+        sources.sort_unstable();
+        sources.dedup();
+        let (mut encoded, mut alias, mut known) = (Vec::new(), HashMap::new(), HashMap::new());
+        let mut bytes = document.bytes;
+        for source in sources {
+            let (data, origin) = match encoded_bytes(accessors, source, &known)? {
+                Ok(Found::Bytes(data, origin)) => (data, origin),
+                Ok(Found::Known(first)) => {
+                    alias.insert(source, first);
+                    continue;
+                }
+                Err(why) => {
+                    let place = format!("/images/{source}");
+                    notes.add(format!("image {why}"), place, "its material has its factors alone");
+                    continue;
+                }
+            };
+            bytes = bytes.saturating_add(data.len());
+            encoded.push((source, data));
+            if let Some(origin) = origin {
+                known.insert(origin, source);
+            }
+        }
+        let wanted: Vec<Wanted> =
+            wanted.iter().map(|(i, space)| (alias.get(i).copied().unwrap_or(*i), key(*space))).collect();
+        let mut pixels = PIXELS_FLOOR.saturating_add(bytes.saturating_mul(PIXELS_PER_BYTE));
+        let mut readable = Vec::new();
+        for (source, data) in encoded {
+            match check_size(&data, &mut pixels) {
+                Ok(()) => readable.push((source, data)),
+                Err(why) => unreadable(notes, source, &why),
+            }
+        }
+        let decoded: Vec<(usize, Result<DynamicImage, String>)> =
+            readable.into_par_iter().map(|(source, data)| (source, decode(&data))).collect();
+        let mut out = Self { images: Vec::new(), index: HashMap::new(), alias };
+        let mut spaces_of: HashMap<usize, Vec<ColorSpaceKey>> = HashMap::new();
+        for (image, space) in wanted {
+            let spaces = spaces_of.entry(image).or_default();
+            if !spaces.contains(&space) {
+                spaces.push(space);
+            }
+        }
+        let mut jobs = Vec::new();
+        for (source, image) in decoded {
+            let image = match image {
+                Ok(image) => image.into_rgba8(),
+                Err(why) => {
+                    unreadable(notes, source, &why);
+                    continue;
+                }
+            };
+            let spaces = spaces_of.remove(&source).unwrap_or_default();
+            let name = name_of(document, source)?;
+            let last = spaces.len().saturating_sub(1);
+            let mut image = Some(image);
+            for (i, space) in spaces.into_iter().enumerate() {
+                let copy = if i == last { image.take() } else { image.clone() };
+                if let Some(copy) = copy {
+                    out.index.insert((source, space), jobs.len());
+                    jobs.push((name.clone(), copy, space));
+                }
+            }
+        }
+        out.images = jobs
+            .into_par_iter()
+            .map(|(name, image, space)| {
+                let (width, height) = image.dimensions();
+                let texels = image.as_raw().as_chunks::<4>().0.to_vec();
+                drop(image);
+                let space = match space {
+                    ColorSpaceKey::Srgb => ColorSpace::Srgb,
+                    ColorSpaceKey::Linear => ColorSpace::Linear,
+                };
+                Image::from_rgba8(&name, width, height, texels, space)
+            })
+            .collect();
+        Ok(out)
+    }
+
+    /// The scene's image for a file's image; none if it could not be had.
+    pub fn find(&self, image: usize, space: ColorSpace) -> Option<usize> {
+        let image = self.alias.get(&image).copied().unwrap_or(image);
+        self.index.get(&(image, key(space))).copied()
+    }
+}
+
+fn unreadable(notes: &Notes, source: usize, why: &str) {
+    let feature = format!("image that cannot be read ({why})");
+    notes.add(feature, format!("/images/{source}"), "its material has its factors alone");
+}
+
+fn name_of(document: &Document, source: usize) -> Result<String> {
+    let element = document.element("images", source, "/textures")?;
+    let name = element.name();
+    if !name.is_empty() {
+        return Ok(name);
+    }
+    let uri = element.text("uri")?.filter(|u| !u.starts_with("data:"));
+    Ok(uri.map_or_else(|| format!("image {source}"), str::to_owned))
+}
+
+/// An image's encoded bytes, or the image that has the same ones.
+enum Found {
+    Bytes(Vec<u8>, Option<Origin>),
+    Known(usize),
+}
+
+/// The encoded bytes of an image, or why they are not there: a picture that was not copied along is no reason not to
+/// render the rest. URIs that lead out of the folder stay errors.
+fn encoded_bytes(
+    accessors: Accessors,
+    source: usize,
+    known: &HashMap<Origin, usize>,
+) -> Result<Result<Found, String>> {
+    let document = accessors.document;
+    let element = document.element("images", source, "/textures")?;
+    let fresh = |origin: Origin| match known.get(&origin) {
+        Some(&first) => Err(Found::Known(first)),
+        None => Ok(origin),
+    };
+    if let Some(view) = element.index("bufferView")? {
+        return Ok(Ok(match fresh(Origin::View(view)) {
+            Err(known) => known,
+            Ok(origin) => {
+                let bytes = accessors.buffers.view(view, &element.place)?.bytes;
+                // Views may overlap: many images, few bytes.
+                accessors.buffers.budget.take(bytes.len(), 1, |message| element.error(message))?;
+                Found::Bytes(bytes.to_vec(), Some(origin))
+            }
+        }));
+    }
+    let Some(text) = element.text("uri")? else { return Ok(Err("without uri and bufferView".into())) };
+    Ok(match uri::resolve(document, text, &element.place)? {
+        Source::Data(bytes) => Ok(Found::Bytes(bytes, None)),
+        Source::Missing(_) => Err(format!("{text} is missing")),
+        Source::File(path) => match fresh(Origin::File(path)) {
+            Err(known) => Ok(known),
+            Ok(Origin::File(path)) => read_file(&path)
+                .map(|bytes| Found::Bytes(bytes, Some(Origin::File(path))))
+                .map_err(|_| format!("{text} cannot be read")),
+            Ok(Origin::View(_)) => Err(format!("{text} is no file")),
+        },
+    })
+}
+
+/// Checks an image's size by its header, and takes it from the pixels that are left.
+fn check_size(data: &[u8], pixels: &mut usize) -> Result<(), String> {
+    let reader = ImageReader::new(Cursor::new(data)).with_guessed_format().map_err(|e| e.to_string())?;
+    let (width, height) = reader.into_dimensions().map_err(|e| first_line(&e.to_string()))?;
+    if width == 0 || height == 0 || width > MAX_SIDE || height > MAX_SIDE {
+        return Err(format!("{width}x{height} pixels; sides from 1 to {MAX_SIDE} are read"));
+    }
+    let count = width as usize * height as usize;
+    *pixels = pixels
+        .checked_sub(count)
+        .ok_or_else(|| format!("{width}x{height} pixels are more than its size justifies"))?;
+    Ok(())
+}
+
+fn decode(data: &[u8]) -> Result<DynamicImage, String> {
+    let mut reader = ImageReader::new(Cursor::new(data)).with_guessed_format().map_err(|e| e.to_string())?;
+    let mut limits = Limits::default();
+    (limits.max_image_width, limits.max_image_height) = (Some(MAX_SIDE), Some(MAX_SIDE));
+    // 16 bytes a pixel at the largest size that `check_size` let pass.
+    limits.max_alloc = Some(16 * u64::from(MAX_SIDE) * u64::from(MAX_SIDE));
+    reader.limits(limits);
+    reader.decode().map_err(|e| first_line(&e.to_string()))
+}
+
+fn first_line(message: &str) -> String {
+    message.lines().next().unwrap_or_default().to_owned()
+}
+
+/// A picture file of an OBJ material; the message says why it cannot be had.
+pub(super) fn load_file(name: &str, data: &[u8], space: ColorSpace) -> Result<Image, String> {
+    let mut pixels = PIXELS_FLOOR.saturating_add(data.len().saturating_mul(PIXELS_PER_BYTE));
+    check_size(data, &mut pixels)?;
+    let image = decode(data)?.into_rgba8();
+    let (width, height) = image.dimensions();
+    Ok(Image::from_rgba8(name, width, height, image.as_raw().as_chunks::<4>().0.to_vec(), space))
+}
+
+/// The equirectangular picture of a world: `.hdr` and `.exr` are linear, the others sRGB.
+///
+/// The artist asked for this picture by name: without it all light would be wrong, so it is an error if missing.
+pub(super) fn load_world(document: &Document, uri: &str, place: &str) -> Result<Image> {
+    let data = match uri::resolve(document, uri, place)? {
+        Source::Data(bytes) => bytes,
+        Source::File(path) => read_file(&path)?,
+        missing @ Source::Missing(_) => missing.read(document, place)?,
+    };
+    let mut pixels = PIXELS_FLOOR.saturating_add(data.len().saturating_mul(PIXELS_PER_BYTE));
+    let broken =
+        |why: String| document.error(place, format!("the image cannot be read ({why}); save it again"));
+    check_size(&data, &mut pixels).map_err(broken)?;
+    let image = decode(&data).map_err(broken)?;
+    let (width, height) = (image.width(), image.height());
+    let name = if uri.starts_with("data:") { "world" } else { uri };
+    Ok(match image {
+        DynamicImage::ImageRgb32F(_) | DynamicImage::ImageRgba32F(_) => {
+            let mut texels = image.into_rgb32f().into_raw().as_chunks::<3>().0.to_vec();
+            for value in texels.as_flattened_mut().iter_mut().filter(|v| !v.is_finite() || **v < 0.0) {
+                *value = 0.0;
+            }
+            Image::from_rgb_f32(name, width, height, texels)
+        }
+        other => {
+            let texels = other.into_rgba8().as_raw().as_chunks::<4>().0.to_vec();
+            Image::from_rgba8(name, width, height, texels, ColorSpace::Srgb)
+        }
+    })
+}

@@ -1,0 +1,143 @@
+//! Cameras and punctual lights, one for each node that carries one.
+
+use super::{
+    document::{Document, Element},
+    ignored::Notes,
+    nodes::Nodes,
+};
+use crate::{
+    Result,
+    scene::{Camera, Lens, Light, LightKind, Projection},
+};
+use glam::{DVec2, Vec3};
+use std::f32::consts::{FRAC_PI_2, FRAC_PI_4};
+
+/// Lumens that glTF's exporters write for a radiant watt.
+pub(super) const LUMENS_PER_WATT: f32 = 683.0;
+
+/// Cameras or lights, and which of the file's each one is: animations speak of those.
+pub(super) struct Carried<T> {
+    /// In node order of the file.
+    pub items: Vec<T>,
+    /// For each item, the file's camera or light.
+    pub sources: Vec<usize>,
+}
+
+/// Reads the cameras of all nodes, whichever scene they are in: a shot's camera is sometimes kept apart.
+pub(super) fn cameras(document: &Document, nodes: &Nodes, notes: &Notes) -> Result<Carried<Camera>> {
+    let mut out = Carried { items: Vec::new(), sources: Vec::new() };
+    for (i, node) in document.elements("nodes")?.iter().enumerate() {
+        let Some(source) = node.index("camera")? else { continue };
+        let element = document.element("cameras", source, &node.place)?;
+        let name = [node.name(), element.name()].into_iter().find(|n| !n.is_empty());
+        let name = name.unwrap_or_else(|| format!("camera {}", out.items.len()));
+        let lens = lens(&element, notes)?;
+        out.items.push(Camera { name, node: nodes.scene_node[i], lens });
+        out.sources.push(source);
+    }
+    Ok(out)
+}
+
+fn lens(element: &Element, notes: &Notes) -> Result<Lens> {
+    let kind = element.text("type")?.unwrap_or_default();
+    let Some(values) = element.get(kind).filter(|_| matches!(kind, "perspective" | "orthographic")) else {
+        return Err(
+            element.error("has neither a perspective nor an orthographic lens; export the file again")
+        );
+    };
+    let positive = |key: &str| -> Result<f64> {
+        let value = values.number(key)?.ok_or_else(|| values.error(format!("`{key}` is missing")))?.abs();
+        if value > 0.0 {
+            Ok(value)
+        } else {
+            Err(values.error(format!("`{key}` must not be 0; set the lens")))
+        }
+    };
+    let projection = if kind == "perspective" {
+        let yfov = positive("yfov")?;
+        if yfov >= std::f64::consts::PI {
+            return Err(values.error(format!("a yfov of {yfov} is not below pi; set the lens")));
+        }
+        Projection::Perspective { yfov }
+    } else {
+        // Negative magnifications are met in the wild and mean no mirror there.
+        Projection::Orthographic { xmag: positive("xmag")?, ymag: positive("ymag")? }
+    };
+    let near = values.number("znear")?.unwrap_or(0.0).max(0.0);
+    let far = values.number("zfar")?.filter(|far| *far > near).unwrap_or(f64::INFINITY);
+    let mut shift = DVec2::ZERO;
+    if let Some(extras) = element.get("extras") {
+        shift = extras.numbers("shift")?.unwrap_or_default().into();
+        if let Some(dof) = extras.get("dof") {
+            notes.add("depth of field", dof.place, "everything is sharp");
+        }
+    }
+    Ok(Lens { projection, shift, near, far })
+}
+
+/// Reads the lights of the nodes in the scene.
+pub(super) fn lights(document: &Document, nodes: &Nodes, notes: &Notes) -> Result<Carried<Light>> {
+    let mut out = Carried { items: Vec::new(), sources: Vec::new() };
+    let lights = match document.root().extension("KHR_lights_punctual") {
+        Some(extension) => extension.items("lights")?,
+        None => Vec::new(),
+    };
+    for (i, node) in document.elements("nodes")?.iter().enumerate().filter(|(i, _)| nodes.in_scene[*i]) {
+        let Some(extension) = node.extension("KHR_lights_punctual") else { continue };
+        let source = extension.required_index("light")?;
+        let Some(element) = lights.get(source) else {
+            let message = format!("there is no light {source} among {}; export the file again", lights.len());
+            return Err(extension.error(message));
+        };
+        let name = [node.name(), element.name()].into_iter().find(|n| !n.is_empty());
+        let name = name.unwrap_or_else(|| format!("light {}", out.items.len()));
+        out.items.push(Light { name, node: nodes.scene_node[i], ..light(element, notes)? });
+        out.sources.push(source);
+    }
+    Ok(out)
+}
+
+fn light(element: &Element, notes: &Notes) -> Result<Light> {
+    let kind = match element.text("type")? {
+        Some("directional") => LightKind::Directional,
+        Some("point") => LightKind::Point,
+        Some("spot") => {
+            let (mut inner_cone, mut outer_cone) = (0.0, FRAC_PI_4);
+            if let Some(spot) = element.get("spot") {
+                outer_cone = spot.f32("outerConeAngle", FRAC_PI_4)?.clamp(1e-4, FRAC_PI_2);
+                inner_cone = spot.f32("innerConeAngle", 0.0)?.clamp(0.0, outer_cone);
+            }
+            LightKind::Spot { inner_cone, outer_cone }
+        }
+        other => {
+            let message =
+                format!("unknown type {}; make it point, spot or directional", other.unwrap_or("(none)"));
+            return Err(element.error(message));
+        }
+    };
+    if let Some(extras) = element.get("extras") {
+        for (key, effect) in [
+            ("radius", "shadows of this light are sharp"),
+            ("angle", "shadows of this light are sharp"),
+            ("area", "the light is a spot and its shadows are sharp"),
+        ] {
+            let Some(value) = extras.get(key) else { continue };
+            let size = if key == "area" { 1.0 } else { value.as_number()? };
+            if size > 0.0 {
+                notes.add(format!("light {key}"), value.place, effect);
+            }
+        }
+        if let Some(specular) = extras.get("specular").filter(|s| s.value.as_f64() != Some(1.0)) {
+            notes.add("light specular factor", specular.place, "highlights have their full strength");
+        }
+    }
+    let range = element.get("range").map(|_| element.f32("range", 0.0)).transpose()?;
+    Ok(Light {
+        name: String::new(),
+        node: 0,
+        kind,
+        color: Vec3::from(element.f32s("color", [1.0; 3])?).max(Vec3::ZERO),
+        intensity: element.f32("intensity", 1.0)?.max(0.0) / LUMENS_PER_WATT,
+        range: range.filter(|r| *r > 0.0),
+    })
+}

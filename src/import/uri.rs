@@ -1,0 +1,105 @@
+//! URIs of buffers and images: data, or a file in the document's own folder.
+
+use super::document::{Document, read_file};
+use crate::{Error, Result};
+use base64::{
+    Engine,
+    alphabet::STANDARD,
+    engine::{DecodePaddingMode, GeneralPurpose, GeneralPurposeConfig},
+};
+use percent_encoding::percent_decode_str;
+use std::{
+    fs,
+    path::{Component, Path, PathBuf},
+};
+
+/// Exporters leave out the padding, or leave stray bits in the last digit.
+const BASE64: GeneralPurpose = GeneralPurpose::new(
+    &STANDARD,
+    GeneralPurposeConfig::new()
+        .with_decode_padding_mode(DecodePaddingMode::Indifferent)
+        .with_decode_allow_trailing_bits(true),
+);
+
+/// Where a URI leads.
+pub(super) enum Source {
+    /// The bytes stood in the URI.
+    Data(Vec<u8>),
+    /// A file in the document's folder or below; it exists.
+    File(PathBuf),
+    /// A file that is not there.
+    Missing(PathBuf),
+}
+
+impl Source {
+    /// The bytes; a missing file is an error.
+    pub fn read(self, document: &Document, place: &str) -> Result<Vec<u8>> {
+        match self {
+            Self::Data(bytes) => Ok(bytes),
+            Self::File(path) => read_file(&path),
+            Self::Missing(path) => {
+                let message = format!("{} is missing; put it beside the file", path.display());
+                Err(document.error(place, message))
+            }
+        }
+    }
+}
+
+/// Resolves a URI found at `place`, or refuses it.
+pub(super) fn resolve(document: &Document, uri: &str, place: &str) -> Result<Source> {
+    if uri.get(..5).is_some_and(|scheme| scheme.eq_ignore_ascii_case("data:")) {
+        return data(document, &uri[5..], place).map(Source::Data);
+    }
+    let path = percent_decode_str(uri)
+        .decode_utf8()
+        .map_err(|_| document.error(place, "the URI is not UTF-8 after percent-decoding"))?;
+    in_folder(&document.folder, &path).map_err(|why| document.error(place, why))
+}
+
+/// The file `path` in `folder` or below, or why it will not be read. `folder` is canonical.
+pub(super) fn in_folder(folder: &Path, path: &str) -> Result<Source, String> {
+    // Windows tools write back-slashes; on other systems they would be part of the name.
+    let path = path.replace('\\', "/");
+    let refuse = |why: &str| Err(format!("`{path}` {why}; only files in the scene's own folder are read"));
+    let scheme = path.split_once(':').map(|(scheme, _)| scheme);
+    if scheme
+        .is_some_and(|s| !s.is_empty() && s.chars().all(|c| c.is_ascii_alphanumeric() || "+-.".contains(c)))
+    {
+        return refuse("has a scheme");
+    }
+    let mut depth = 0_i32;
+    for component in Path::new(&path).components() {
+        match component {
+            Component::Normal(_) => depth += 1,
+            Component::CurDir => {}
+            Component::ParentDir => depth -= 1,
+            Component::RootDir | Component::Prefix(_) => return refuse("is absolute"),
+        }
+        if depth < 0 {
+            return refuse("leaves the folder");
+        }
+    }
+    let full = folder.join(&path);
+    let Ok(real) = fs::canonicalize(&full) else { return Ok(Source::Missing(full)) };
+    if real.starts_with(folder) { Ok(Source::File(real)) } else { refuse("is a link that leaves the folder") }
+}
+
+/// The folder that holds `file`, canonical.
+pub(super) fn folder_of(file: &Path) -> Result<PathBuf> {
+    let parent = file.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    fs::canonicalize(parent).map_err(|e| Error::input(file, "folder", format!("cannot be read ({e})")))
+}
+
+/// The bytes of `[<type>][;base64],<data>`.
+fn data(document: &Document, rest: &str, place: &str) -> Result<Vec<u8>> {
+    let (head, body) = rest
+        .split_once(',')
+        .ok_or_else(|| document.error(place, "a data URI without a comma; export the file again"))?;
+    if !head.to_ascii_lowercase().ends_with(";base64") {
+        return Ok(percent_decode_str(body).collect());
+    }
+    let digits: Vec<u8> = percent_decode_str(body).filter(|b| !b.is_ascii_whitespace()).collect();
+    BASE64
+        .decode(digits)
+        .map_err(|e| document.error(place, format!("invalid base64 ({e}); export the file again")))
+}

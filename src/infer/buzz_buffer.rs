@@ -1,0 +1,279 @@
+//! The Buzzbuffer: a window-sized store of samples, the paper's data structure and its namesake.
+
+use crate::frame::{PackedNormal, PixelClass, RayCounts, SurfaceRef, SurfaceSample};
+use crate::scene::View;
+use glam::{DVec3, Mat4, Vec3};
+use rayon::prelude::*;
+
+/// The object tag of a pixel about which nothing is known yet (the paper's id_tag -2).
+pub const UNKNOWN: u32 = u32::MAX;
+
+/// One sample a pixel, as structure of arrays, rows from the top.
+///
+/// State: 56 bytes a pixel and 4 more for each 32 lights, of which 1 is the class.
+#[derive(Debug, Clone, Default)]
+pub struct BuzzBuffer {
+    width: usize,
+    height: usize,
+    lit_words: usize,
+    /// Planar depth in the view that the buffer was made for; infinite for the background.
+    pub z: Vec<f32>,
+    /// See [`SurfaceSample::position`].
+    pub position: Vec<Vec3>,
+    /// See [`SurfaceSample::object`]; [`UNKNOWN`] where a ray is wanted.
+    pub object: Vec<u32>,
+    /// See [`SurfaceSample::surface`].
+    pub surface: Vec<SurfaceRef>,
+    /// See [`SurfaceSample::normal`].
+    pub normal: Vec<PackedNormal>,
+    /// See [`SurfaceSample::irradiance`].
+    pub irradiance: Vec<Vec3>,
+    /// Shadow bits, `lit_words` for each pixel: set where the light reaches the point.
+    pub lit: Vec<u32>,
+    /// How each pixel was obtained.
+    pub class: Vec<PixelClass>,
+}
+
+impl BuzzBuffer {
+    /// A buffer in which nothing is known.
+    pub fn new(width: usize, height: usize, lit_words: usize) -> Self {
+        let n = width * height;
+        Self {
+            width,
+            height,
+            lit_words,
+            z: vec![f32::INFINITY; n],
+            position: vec![Vec3::ZERO; n],
+            object: vec![UNKNOWN; n],
+            surface: vec![SurfaceRef::BACKGROUND; n],
+            normal: vec![PackedNormal::default(); n],
+            irradiance: vec![Vec3::ZERO; n],
+            lit: vec![0; n * lit_words],
+            class: vec![PixelClass::Traced; n],
+        }
+    }
+
+    /// Bytes that a pixel of a buffer for `lights` lights takes.
+    pub fn bytes_per_pixel(lights: usize) -> usize {
+        size_of::<f32>()
+            + 2 * size_of::<Vec3>()
+            + size_of::<u32>()
+            + size_of::<SurfaceRef>()
+            + size_of::<PackedNormal>()
+            + lights.div_ceil(32) * size_of::<u32>()
+            + size_of::<PixelClass>()
+    }
+
+    /// Columns.
+    pub fn width(&self) -> usize {
+        self.width
+    }
+
+    /// Rows.
+    pub fn height(&self) -> usize {
+        self.height
+    }
+
+    /// Words of shadow bits a pixel has.
+    pub fn lit_words(&self) -> usize {
+        self.lit_words
+    }
+
+    /// The sample of pixel number `i`.
+    pub fn sample(&self, i: usize) -> SurfaceSample {
+        SurfaceSample {
+            position: self.position[i],
+            surface: self.surface[i],
+            object: self.object[i],
+            normal: self.normal[i],
+            irradiance: self.irradiance[i],
+        }
+    }
+
+    /// The shadow bits of pixel number `i`.
+    pub fn lit(&self, i: usize) -> &[u32] {
+        &self.lit[i * self.lit_words..][..self.lit_words]
+    }
+
+    /// Forgets everything: every pixel is wanted, as `class`.
+    pub fn forget(&mut self, class: PixelClass) {
+        self.object.fill(UNKNOWN);
+        self.class.fill(class);
+    }
+
+    /// Pixels of each class.
+    pub fn count_classes(&self) -> [u64; PixelClass::COUNT] {
+        let mut counts = [0; PixelClass::COUNT];
+        for &class in &self.class {
+            counts[class as usize] += 1;
+        }
+        counts
+    }
+
+    /// Casts a ray through the centre of every pixel that is unknown.
+    pub fn cast_unknown(&mut self, projector: &Projector, rays: &impl CastRays) -> RayCounts {
+        let cast_row = |y: usize, row: Row<'_>| {
+            let mut counts = RayCounts::default();
+            for x in 0..row.object.len() {
+                if row.object[x] != UNKNOWN {
+                    continue;
+                }
+                let lit = &mut row.lit[x * row.lit_words..][..row.lit_words];
+                let sample = rays.cast(x, y, lit, &mut counts);
+                row.z[x] = projector.depth(&sample);
+                row.position[x] = sample.position;
+                row.object[x] = sample.object;
+                row.surface[x] = sample.surface;
+                row.normal[x] = sample.normal;
+                row.irradiance[x] = sample.irradiance;
+            }
+            counts
+        };
+        self.rows_mut().enumerate().map(|(y, row)| cast_row(y, row)).reduce(RayCounts::default, |mut a, b| {
+            a += b;
+            a
+        })
+    }
+
+    /// The rows, for writing in parallel.
+    pub(super) fn rows_mut(&mut self) -> impl IndexedParallelIterator<Item = Row<'_>> {
+        let (w, lit_words) = (self.width, self.lit_words);
+        // A scene without lights has no shadow words, but a chunk's length may not be zero.
+        self.lit.resize((w * self.height * lit_words).max(self.height), 0);
+        let lit_row = (w * lit_words).max(1);
+        (
+            self.z.par_chunks_mut(w),
+            self.position.par_chunks_mut(w),
+            self.object.par_chunks_mut(w),
+            self.surface.par_chunks_mut(w),
+            self.normal.par_chunks_mut(w),
+            self.irradiance.par_chunks_mut(w),
+            self.lit.par_chunks_mut(lit_row),
+            self.class.par_chunks_mut(w),
+        )
+            .into_par_iter()
+            .map(move |(z, position, object, surface, normal, irradiance, lit, class)| Row {
+                z,
+                position,
+                object,
+                surface,
+                normal,
+                irradiance,
+                lit,
+                class,
+                lit_words,
+            })
+    }
+}
+
+/// One row of a [`BuzzBuffer`].
+pub(super) struct Row<'a> {
+    pub z: &'a mut [f32],
+    pub position: &'a mut [Vec3],
+    pub object: &'a mut [u32],
+    pub surface: &'a mut [SurfaceRef],
+    pub normal: &'a mut [PackedNormal],
+    pub irradiance: &'a mut [Vec3],
+    pub lit: &'a mut [u32],
+    pub class: &'a mut [PixelClass],
+    pub lit_words: usize,
+}
+
+/// Whatever can find out what a pixel's centre sees: the tracer, or a test's table.
+pub trait CastRays: Sync {
+    /// The sample that the ray through the centre of pixel (x, y) finds; sets `lit`, counts what it casts.
+    fn cast(&self, x: usize, y: usize, lit: &mut [u32], counts: &mut RayCounts) -> SurfaceSample;
+}
+
+/// The paper's four by four matrix and perspective division: where a stored hit lies in a view.
+///
+/// Single precision on coordinates relative to `origin` (the segment's first eye): 1e-4 pixel for hits as far away
+/// as they like, as long as the eye stays within some 10^4 times the distance of the nearest thing seen.
+#[derive(Debug, Clone, Copy)]
+pub struct Projector {
+    raster_from_world: Mat4,
+    eye: Vec3,
+    forward: Vec3,
+    perspective: bool,
+    near: f32,
+    far: f32,
+    width: f32,
+    height: f32,
+}
+
+/// Where a sample lies in a view.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Projected {
+    /// Raster coordinates.
+    pub x: f32,
+    /// Raster coordinates.
+    pub y: f32,
+    /// Planar depth; infinite for the background.
+    pub z: f32,
+}
+
+impl Projector {
+    /// The projection of `view` for positions relative to `origin`.
+    pub fn new(view: &View, origin: DVec3) -> Self {
+        Self {
+            raster_from_world: view.raster_from_world(origin).as_mat4(),
+            eye: (view.eye - origin).as_vec3(),
+            forward: view.forward.as_vec3(),
+            perspective: view.is_perspective(),
+            near: view.lens.near as f32,
+            far: view.lens.far as f32,
+            width: view.width as f32,
+            height: view.height as f32,
+        }
+    }
+
+    /// Where the sample appears, or none where it is behind the eye, clipped, or turned away.
+    pub fn project(&self, position: Vec3, normal: Vec3, background: bool) -> Option<Projected> {
+        if background {
+            // Infinitely far away: only the direction counts. Parallel rays give it no place.
+            let r = self.raster_from_world * position.extend(0.0);
+            let seen = self.perspective && r.w > 0.0;
+            return seen.then(|| Projected { x: r.x / r.w, y: r.y / r.w, z: f32::INFINITY });
+        }
+        let from_eye = if self.perspective { position - self.eye } else { self.forward };
+        let r = self.raster_from_world * position.extend(1.0);
+        let seen = r.z >= self.near && r.z <= self.far && r.w > 0.0 && from_eye.dot(normal) < 0.0;
+        seen.then(|| Projected { x: r.x / r.w, y: r.y / r.w, z: r.z })
+    }
+
+    /// Planar depth of a sample; infinite for the background.
+    pub fn depth(&self, sample: &SurfaceSample) -> f32 {
+        if sample.surface.is_background() {
+            f32::INFINITY
+        } else {
+            (self.raster_from_world * sample.position.extend(1.0)).z
+        }
+    }
+
+    /// Number of the pixel that holds raster position (x, y), if it is in the window.
+    pub fn pixel(&self, x: f32, y: f32) -> Option<usize> {
+        let inside = x >= 0.0 && y >= 0.0 && x < self.width && y < self.height;
+        inside.then(|| y as usize * self.width as usize + x as usize)
+    }
+
+    /// The direction in which a ray of this view passes through `position`; not normalised.
+    pub(super) fn direction_to(&self, position: Vec3) -> Vec3 {
+        if self.perspective { position - self.eye } else { self.forward }
+    }
+
+    pub(super) fn raster_from_world(&self) -> &Mat4 {
+        &self.raster_from_world
+    }
+
+    pub(super) fn is_perspective(&self) -> bool {
+        self.perspective
+    }
+
+    pub(super) fn near(&self) -> f32 {
+        self.near
+    }
+
+    pub(super) fn size(&self) -> (f32, f32) {
+        (self.width, self.height)
+    }
+}

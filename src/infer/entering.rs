@@ -1,0 +1,66 @@
+//! New objects: where the new view looks through space that the old one did not see.
+//!
+//! The paper's "The New Object Problem". Samples that barely move leave no gap through which something that comes in
+//! from the side could be found. So no old sample is trusted on the contested area: the pixels whose pyramid, at the
+//! depth k behind which new things may be, lies outside the old viewing volume. Pure rotations need none of this:
+//! they move every sample alike, and what comes into view finds its pixels empty.
+
+use super::Marks;
+use crate::frame::PixelClass;
+use crate::scene::View;
+use glam::{DVec3, DVec4};
+use rayon::prelude::*;
+
+/// Camera moves shorter than this share of k count as pure rotations: they shift nothing by a thousandth of a pixel
+/// on an image of a thousand.
+const STILL: f64 = 1e-6;
+
+/// Marks the contested area for new objects that are at planar depth `k` or farther.
+///
+/// A pixel is known if the point at depth k on its centre ray lies in the old viewing volume. That point's old raster
+/// position is a homography of the new one, so each row's known pixels are one span; together they are the paper's
+/// scan-converted polygon of at most eight vertices.
+pub fn entering(old: &View, new: &View, k: f64, marks: &Marks) {
+    if (old.eye - new.eye).length() <= STILL * k && old.is_perspective() {
+        return;
+    }
+    let old_raster_from_world = old.raster_from_world(DVec3::ZERO);
+    let old_raster = |x: f64, y: f64| {
+        let ray = new.ray(x, y);
+        old_raster_from_world * (ray.origin + ray.direction * k).extend(1.0)
+    };
+    let (width, height) = (f64::from(old.width), f64::from(old.height));
+    let near = old.lens.near;
+    // Positive inside, affine along a row.
+    let sides = |r: DVec4| [r.x, r.y, width * r.w - r.x, height * r.w - r.y, r.z - near];
+    let columns = new.width as usize;
+    (0..new.height as usize).into_par_iter().for_each(|row| {
+        let y = row as f64 + 0.5;
+        let first = sides(old_raster(0.5, y));
+        let last = sides(old_raster(columns as f64 - 0.5, y));
+        let (mut from, mut to) = (0, columns);
+        for (a, b) in first.into_iter().zip(last) {
+            let (f, t) = positive_span(a, b, columns);
+            from = from.max(f);
+            to = to.min(t);
+        }
+        let to = to.max(from);
+        for x in (0..from).chain(to..columns) {
+            marks.set(row * columns + x, PixelClass::Entering);
+        }
+    });
+}
+
+/// Columns `from..to` on which a value that goes evenly from `a` (first column) to `b` (last) is not negative. Slack of
+/// a thousandth of a pixel keeps what touches the border.
+fn positive_span(a: f64, b: f64, columns: usize) -> (usize, usize) {
+    let slack = 1e-3 * (a.abs() + b.abs()) / columns as f64;
+    let (a, b) = (a + slack, b + slack);
+    let steps = (columns - 1).max(1) as f64;
+    match (a >= 0.0, b >= 0.0) {
+        (true, true) => (0, columns),
+        (false, false) => (0, 0),
+        (true, false) => (0, (a / (a - b) * steps).floor() as usize + 1),
+        (false, true) => ((a / (a - b) * steps).ceil() as usize, columns),
+    }
+}

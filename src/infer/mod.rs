@@ -1,0 +1,132 @@
+//! The paper: S. J. Adelson and L. F. Hodges, *Exploiting Spatio-Temporal Coherence in Ray-Traced Animation Frames*,
+//! GIT-GVU-93-01, Georgia Institute of Technology, 1993.
+//!
+//! [`Inference::infer`] is its algorithm box. Nothing here knows a file format or a renderer: it is given a buffer of
+//! samples, two views, and something that casts a ray when told to. `docs/algorithm.md` maps every section of the
+//! paper to a function here and says where and why we depart from it.
+//!
+//! | paper | here |
+//! |---|---|
+//! | Buzzbuffer | [`BuzzBuffer`] |
+//! | id_tag, -2 | [`BuzzBuffer::object`], [`UNKNOWN`] |
+//! | the four by four matrix, d / (d + z_t) | [`Projector`] |
+//! | good, missed, overlapped, bad pixels | [`PixelClass`] |
+//! | miny, (begx, begy) | depth and pixel of a landing, in [`project()`] |
+//! | L, C, C1, (endx, endy), int_z | `Line` in `obscured.rs` |
+//! | test_z | in [`creeping()`] |
+//! | P, k | [`entering()`] |
+
+mod buzz_buffer;
+mod creeping;
+mod entering;
+mod obscured;
+mod project;
+
+pub use buzz_buffer::{BuzzBuffer, CastRays, Projected, Projector, UNKNOWN};
+pub use creeping::{Along, creeping};
+pub use entering::entering;
+pub use obscured::obscured;
+pub use project::{Landings, gather, project};
+
+use crate::frame::{PixelClass, RayCounts};
+use crate::scene::View;
+use creeping::forget_creeping;
+use glam::DVec3;
+use rayon::prelude::*;
+use std::sync::atomic::{AtomicU8, Ordering::Relaxed};
+use std::time::{Duration, Instant};
+
+/// Infers frames from their neighbours. Holds what the work needs between two frames, so that none is allocated for
+/// each.
+#[derive(Debug, Default)]
+pub struct Inference {
+    landings: Landings,
+    marks: Marks,
+}
+
+/// What inferring a frame took.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct Cost {
+    /// Rays cast for pixels that no sample explains.
+    pub rays: RayCounts,
+    /// Wall time spent on rays; the rest is the work that replaces tracing.
+    pub tracing: Duration,
+}
+
+impl Inference {
+    /// Makes `new`, the samples of `new_view`, from `old`, those of `old_view`. Positions are relative to `origin`.
+    ///
+    /// Every sample that is reused lies inside its pixel's square (the half-pixel guarantee), and no old hit is known
+    /// to hide something before it; every other pixel is traced through its centre.
+    pub fn infer(
+        &mut self,
+        (old, old_view): (&BuzzBuffer, &View),
+        (new, new_view): (&mut BuzzBuffer, &View),
+        origin: DVec3,
+        rays: &impl CastRays,
+    ) -> Cost {
+        let (landings, marks) = (&mut self.landings, &mut self.marks);
+        let (from, to) = (Projector::new(old_view, origin), Projector::new(new_view, origin));
+        let mut cost = Cost::default();
+
+        // Initialise the Buzzbuffer.
+        landings.clear(old.object.len());
+        marks.clear(old.object.len());
+
+        // Project the old pixels; the nearest hit wins.
+        let nearest = project(old, &to, landings, marks);
+
+        // Clear what the line L behind an old hit could be hiding.
+        obscured(old, &from, &to, landings, marks);
+
+        // Clear the contested area, where new objects may come in: k is the nearest that is known.
+        if let Some(k) = nearest {
+            entering(old_view, new_view, f64::from(k), marks);
+        }
+        gather(old, landings, marks, new);
+
+        // Ray-cast the positions that nothing explains, then the gaps that opened inside objects.
+        cost.cast(new, &to, rays);
+        for along in [Along::Columns, Along::Rows] {
+            creeping(new, landings, along, marks);
+            forget_creeping(new, marks);
+            cost.cast(new, &to, rays);
+        }
+        cost
+    }
+}
+
+impl Cost {
+    fn cast(&mut self, buffer: &mut BuzzBuffer, view: &Projector, rays: &impl CastRays) {
+        let start = Instant::now();
+        self.rays += buffer.cast_unknown(view, rays);
+        self.tracing += start.elapsed();
+    }
+}
+
+/// What has been found out about each pixel. The strongest finding stays, whatever the order of finding.
+#[derive(Debug, Default)]
+pub struct Marks(Vec<AtomicU8>);
+
+impl Marks {
+    /// Nothing is known about any of `pixels` pixels.
+    pub fn clear(&mut self, pixels: usize) {
+        self.0.resize_with(pixels, AtomicU8::default);
+        self.0.par_iter_mut().with_min_len(1 << 14).for_each(|m| *m.get_mut() = 0);
+    }
+
+    /// Notes that a pixel is of `class`, one of those below; a later one in this order wins.
+    pub fn set(&self, pixel: usize, class: PixelClass) {
+        let rank = Self::RANKS.iter().position(|&c| c == class).unwrap_or(0) as u8;
+        self.0[pixel].fetch_max(rank + 1, Relaxed);
+    }
+
+    /// The strongest finding about a pixel.
+    pub fn get(&self, pixel: usize) -> Option<PixelClass> {
+        let rank = self.0[pixel].load(Relaxed).checked_sub(1)?;
+        Some(Self::RANKS[rank as usize])
+    }
+
+    const RANKS: [PixelClass; 4] =
+        [PixelClass::Overlapped, PixelClass::Bad, PixelClass::Entering, PixelClass::Creeping];
+}

@@ -1,0 +1,225 @@
+//! One sequence against another, frame by frame.
+
+use super::{Exposure, ImageError, Percentile, ReadFrame, image_error, read_frame};
+use crate::frame::FrameKind;
+use crate::output::number_in_name;
+use crate::{Error, Result};
+use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+use std::fmt;
+use std::path::{Path, PathBuf};
+
+/// How far a sequence is from its reference.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Comparison {
+    /// All frames that both sequences have, in order.
+    pub frames: Vec<FrameError>,
+    /// The one with the lowest PSNR; if all are identical, the first.
+    pub worst: FrameError,
+    /// Over the frames that are not identical.
+    pub mean: MeanError,
+    /// The same over inferred frames only (as their files' headers say).
+    pub inferred_mean: MeanError,
+    /// Factor of the exposure that all frames were compared at.
+    pub exposure: f32,
+    /// Files of the sequence without a counterpart, and of the reference.
+    pub unmatched: Unmatched,
+}
+
+/// Files that only one side has.
+#[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
+pub struct Unmatched {
+    /// Names in the folder that was compared.
+    pub sequence: Vec<String>,
+    /// Names in the reference's folder.
+    pub reference: Vec<String>,
+}
+
+/// One frame's error.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct FrameError {
+    /// Frame number.
+    pub frame: i64,
+    /// The error.
+    #[serde(flatten)]
+    pub error: ImageError,
+}
+
+/// Means over frames that are not identical to their reference.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+pub struct MeanError {
+    /// Frames that the means are over.
+    pub frames: usize,
+    /// Mean of the decibels; `None` if there is no frame.
+    pub psnr_db: Option<f64>,
+    /// Mean of the means.
+    pub flip_mean: f64,
+    /// Mean of the largest differences.
+    pub max_abs: f64,
+    /// Mean of the shares.
+    pub over_5_percent: f64,
+}
+
+/// Compares the EXR files of folder `sequence` with those of folder `reference`, paired by the frame numbers in their names
+/// (and, if a folder holds several sequences, by the rest of the names).
+///
+/// # Errors
+/// [`Error::Input`] if a folder or file cannot be read, if no frame has a counterpart, or if a pair differs in size.
+pub fn compare(sequence: &Path, reference: &Path) -> Result<Comparison> {
+    let (pairs, unmatched) = pair_up(list(sequence)?, list(reference)?);
+    if pairs.is_empty() {
+        let message = format!("no EXR file in it has the frame number of one in {}", reference.display());
+        return Err(Error::input(sequence, "folder", message));
+    }
+    let percentile = pairs
+        .par_iter()
+        .map(|pair| {
+            let mut percentile = Percentile::default();
+            percentile.add(&read_frame(&pair.reference)?.color);
+            Ok(percentile)
+        })
+        .try_reduce(Percentile::default, |mut a, b| {
+            a.merge(&b);
+            Ok(a)
+        })?;
+    let exposure = Exposure::from_p99(percentile.get(0.99));
+    let errors: Result<Vec<_>> = pairs.par_iter().map(|pair| pair.compare(exposure)).collect();
+    let (frames, inferred): (Vec<_>, Vec<_>) = errors?.into_iter().unzip();
+
+    let decibels = |f: &FrameError| f.error.psnr_db.unwrap_or(f64::INFINITY);
+    let Some(worst) = frames.iter().min_by(|a, b| decibels(a).total_cmp(&decibels(b))).cloned() else {
+        return Err(Error::input(sequence, "folder", "it holds no frames"));
+    };
+    let of_inferred = frames.iter().zip(&inferred).filter(|(_, inferred)| **inferred).map(|(frame, _)| frame);
+    Ok(Comparison {
+        worst,
+        mean: MeanError::of(frames.iter()),
+        inferred_mean: MeanError::of(of_inferred),
+        exposure: exposure.scale,
+        unmatched,
+        frames,
+    })
+}
+
+/// Two files of one frame.
+#[derive(Debug)]
+struct Pair {
+    frame: i64,
+    sequence: PathBuf,
+    reference: PathBuf,
+}
+
+impl Pair {
+    /// The error, and whether the frame was inferred.
+    fn compare(&self, exposure: Exposure) -> Result<(FrameError, bool)> {
+        let a: ReadFrame = read_frame(&self.sequence)?;
+        let b = read_frame(&self.reference)?;
+        if (a.width, a.height) != (b.width, b.height) {
+            let size = |f: &ReadFrame| format!("{}x{}", f.width, f.height);
+            let message = format!("it is {}, but {} is {}", size(&a), self.reference.display(), size(&b));
+            return Err(Error::input(&self.sequence, "dataWindow", message));
+        }
+        let error = image_error(&a.color, &b.color, a.width, exposure);
+        Ok((FrameError { frame: self.frame, error }, matches!(a.kind, Some(FrameKind::Inferred { .. }))))
+    }
+}
+
+impl MeanError {
+    fn of<'a>(frames: impl Iterator<Item = &'a FrameError>) -> Self {
+        let mut sum = Self::default();
+        for error in frames.map(|f| f.error) {
+            if let Some(db) = error.psnr_db {
+                sum.frames += 1;
+                *sum.psnr_db.get_or_insert(0.0) += db;
+                sum.flip_mean += error.flip_mean;
+                sum.max_abs += error.max_abs;
+                sum.over_5_percent += error.over_5_percent;
+            }
+        }
+        let count = sum.frames.max(1) as f64;
+        Self {
+            frames: sum.frames,
+            psnr_db: sum.psnr_db.map(|db| db / count),
+            flip_mean: sum.flip_mean / count,
+            max_abs: sum.max_abs / count,
+            over_5_percent: sum.over_5_percent / count,
+        }
+    }
+}
+
+/// By the name without its number, then by number.
+type Sequences = BTreeMap<String, BTreeMap<i64, PathBuf>>;
+
+/// The EXR files of a folder; hidden ones (such as a run's temporary files) and those without a number are left out.
+fn list(folder: &Path) -> Result<Sequences> {
+    let fail = |e: std::io::Error| Error::input(folder, "folder", e.to_string());
+    let mut sequences = Sequences::new();
+    for entry in std::fs::read_dir(folder).map_err(fail)? {
+        let path = entry.map_err(fail)?.path();
+        let Some(name) = path.file_name().and_then(|n| n.to_str()) else { continue };
+        if name.starts_with('.') || !name.to_ascii_lowercase().ends_with(".exr") {
+            continue;
+        }
+        if let Some(number) = number_in_name(name) {
+            let rest: String = name.chars().filter(|c| !c.is_ascii_digit()).collect();
+            let rest = if number < 0 { rest.replacen('-', "", 1) } else { rest };
+            sequences.entry(rest).or_default().insert(number, path);
+        }
+    }
+    Ok(sequences)
+}
+
+/// Pairs frames; two folders with one sequence each are paired whatever the names.
+fn pair_up(mut sequence: Sequences, mut reference: Sequences) -> (Vec<Pair>, Unmatched) {
+    if sequence.len() == 1 && reference.len() == 1 {
+        sequence = sequence.into_values().map(|frames| (String::new(), frames)).collect();
+        reference = reference.into_values().map(|frames| (String::new(), frames)).collect();
+    }
+    let mut pairs = Vec::new();
+    let mut unmatched = Unmatched::default();
+    let name = |path: PathBuf| path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+    for (key, frames) in sequence {
+        let mut counterparts = reference.remove(&key).unwrap_or_default();
+        for (frame, path) in frames {
+            match counterparts.remove(&frame) {
+                Some(reference) => pairs.push(Pair { frame, sequence: path, reference }),
+                None => unmatched.sequence.push(name(path)),
+            }
+        }
+        unmatched.reference.extend(counterparts.into_values().map(name));
+    }
+    unmatched.reference.extend(reference.into_values().flat_map(BTreeMap::into_values).map(name));
+    (pairs, unmatched)
+}
+
+/// The table of `--format text`.
+impl fmt::Display for Comparison {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        writeln!(f, "{:>15}  {:>8}  {:>8}  {:>8}  {:>8}", "frame", "PSNR dB", "FLIP", "max", "over 5 %")?;
+        let row = |f: &mut fmt::Formatter<'_>, name: String, e: ImageError| {
+            let db = e.psnr_db.map_or("same".to_string(), |db| format!("{db:.2}"));
+            let share = 100.0 * e.over_5_percent;
+            writeln!(f, "{name:>15}  {db:>8}  {:>8.4}  {:>8.4}  {share:>6.2} %", e.flip_mean, e.max_abs)
+        };
+        for FrameError { frame, error } in &self.frames {
+            row(f, frame.to_string(), *error)?;
+        }
+        row(f, format!("worst ({})", self.worst.frame), self.worst.error)?;
+        for (name, mean) in [("mean", self.mean), ("inferred mean", self.inferred_mean)] {
+            if mean.frames > 0 {
+                let MeanError { psnr_db, flip_mean, max_abs, over_5_percent, .. } = mean;
+                row(f, name.to_string(), ImageError { psnr_db, flip_mean, max_abs, over_5_percent })?;
+            }
+        }
+        for (side, names) in
+            [("sequence", &self.unmatched.sequence), ("reference", &self.unmatched.reference)]
+        {
+            if let [first, rest @ ..] = names.as_slice() {
+                let more = if rest.is_empty() { String::new() } else { format!(" and {} more", rest.len()) };
+                writeln!(f, "only in the {side}: {first}{more}")?;
+            }
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,49 @@
+//! The output folder of a run: made, locked for the run's frames, and cleared of what a killed run left.
+
+use super::write::{explain, remove_leftovers};
+use super::{FrameFile, FrameLock, NamePattern, SettingsHash};
+use crate::Result;
+use std::path::{Path, PathBuf};
+
+/// A folder in which this run alone may write its frames, until this is dropped.
+#[derive(Debug)]
+pub struct OutputFolder {
+    path: PathBuf,
+    names: NamePattern,
+    lock: FrameLock,
+}
+
+impl OutputFolder {
+    /// Makes the folder if need be, claims the files of `frames` in it, and removes temporary files that a killed run left
+    /// of them.
+    ///
+    /// # Errors
+    /// [`crate::Error::Output`] if the folder cannot be made or written, or another run is writing one of the frames.
+    pub fn open(path: &Path, names: NamePattern, frames: impl IntoIterator<Item = i64>) -> Result<Self> {
+        std::fs::create_dir_all(path).map_err(|e| explain(path, &e))?;
+        let files: Vec<String> = frames.into_iter().map(|frame| names.file_name(frame)).collect();
+        let lock = FrameLock::acquire(path, &files)?;
+        remove_leftovers(path, &files.into_iter().collect())?;
+        Ok(Self { path: path.to_path_buf(), names, lock })
+    }
+
+    /// The folder.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// Where `frame` is written.
+    pub fn file_of(&self, frame: i64) -> PathBuf {
+        self.path.join(self.names.file_name(frame))
+    }
+
+    /// What stands there now.
+    pub fn check(&self, frame: i64, settings_hash: &SettingsHash) -> FrameFile {
+        FrameFile::check(&self.file_of(frame), settings_hash)
+    }
+
+    /// False where the file system cannot lock: then nothing keeps a second run away.
+    pub fn is_locked(&self) -> bool {
+        self.lock.is_held()
+    }
+}

@@ -1,0 +1,199 @@
+//! Two runs must not write the same files: each run holds a lock on the names that it may write.
+//!
+//! The lock is the operating system's on a small file (`.buzz-<process>-<n>.lock`) in the output folder that lists the
+//! names. It ends with its process, however that dies; the file that is left then is removed by the next run. Runs that
+//! share a folder but no frames do not disturb each other.
+
+use super::write::explain;
+use crate::{Error, Result};
+use std::fs::{self, File, OpenOptions, TryLockError};
+use std::io::{Read, Write};
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicU32, Ordering};
+use std::time::{Duration, Instant};
+
+/// A run's claim on file names in a folder; given up when dropped.
+#[derive(Debug)]
+pub struct FrameLock {
+    /// Holds the system's lock as long as it is open. `None` where the file system has no locks.
+    file: Option<File>,
+    path: PathBuf,
+}
+
+/// How long another run may take to register before something must be wrong.
+const PATIENCE: Duration = Duration::from_secs(10);
+/// Taken for moments only, while a run looks for others and registers itself.
+const REGISTER: &str = ".buzz.lock";
+/// Largest list of names that is read from another run's lock.
+const LONGEST_LIST: u64 = 64 << 20;
+
+impl FrameLock {
+    /// Claims `names` in `folder`.
+    ///
+    /// On a file system without locks there is nothing to hold, and [`FrameLock::is_held`] is false.
+    ///
+    /// # Errors
+    /// [`Error::Output`] if another run holds one of the names, or the folder cannot be written.
+    pub fn acquire(folder: &Path, names: &[String]) -> Result<Self> {
+        static COUNT: AtomicU32 = AtomicU32::new(0);
+        let count = COUNT.fetch_add(1, Ordering::Relaxed);
+        let path = folder.join(format!(".buzz-{}-{count}.lock", std::process::id()));
+        let Some(register) = Register::enter(folder)? else {
+            return Ok(Self { file: None, path });
+        };
+        refuse_if_claimed(folder, names)?;
+        let mut file = File::create(&path).map_err(|e| explain(&path, &e))?;
+        let lock = Self { file: Some(file.try_clone().map_err(|e| explain(&path, &e))?), path };
+        file.try_lock().map_err(|e| explain(&lock.path, &e.into()))?;
+        file.write_all(names.join("\n").as_bytes()).map_err(|e| explain(&lock.path, &e))?;
+        drop(register);
+        Ok(lock)
+    }
+
+    /// False where the file system cannot lock: then nothing keeps a second run away.
+    pub fn is_held(&self) -> bool {
+        self.file.is_some()
+    }
+}
+
+impl Drop for FrameLock {
+    fn drop(&mut self) {
+        if self.file.is_some() {
+            // Nothing can be done about a failure here; the next run tidies up.
+            let _ = fs::remove_file(&self.path);
+        }
+    }
+}
+
+/// Looks at the other runs' locks: an error if a live one claims one of `names`; dead ones are removed.
+fn refuse_if_claimed(folder: &Path, names: &[String]) -> Result<()> {
+    let wanted: std::collections::HashSet<&str> = names.iter().map(String::as_str).collect();
+    for entry in fs::read_dir(folder).map_err(|e| explain(folder, &e))? {
+        let path = entry.map_err(|e| explain(folder, &e))?.path();
+        let name = path.file_name().and_then(|n| n.to_str()).unwrap_or_default();
+        if !(name.starts_with(".buzz-") && name.ends_with(".lock")) {
+            continue;
+        }
+        // It may vanish while we look: its run has just ended.
+        let Ok(file) = File::open(&path) else { continue };
+        match file.try_lock() {
+            Ok(()) => {
+                let _ = fs::remove_file(&path);
+            }
+            Err(TryLockError::Error(_)) => {}
+            Err(TryLockError::WouldBlock) => {
+                let mut list = String::new();
+                file.take(LONGEST_LIST).read_to_string(&mut list).map_err(|e| explain(&path, &e))?;
+                if let Some(claimed) = list.lines().find(|n| wanted.contains(n)) {
+                    let message = format!(
+                        "another run ({name}) is writing it: wait for that run, or choose other --frames or another folder"
+                    );
+                    return Err(Error::output(folder.join(claimed), message));
+                }
+            }
+        }
+    }
+    Ok(())
+}
+
+/// The right to look at and change the folder's locks, held for moments.
+struct Register {
+    _file: File,
+    path: PathBuf,
+}
+
+impl Register {
+    /// Waits for the right. `None` if the file system has no locks.
+    fn enter(folder: &Path) -> Result<Option<Self>> {
+        let path = folder.join(REGISTER);
+        let start = Instant::now();
+        loop {
+            let file = OpenOptions::new().write(true).create(true).truncate(false).open(&path);
+            let file = file.map_err(|e| explain(&path, &e))?;
+            match file.try_lock() {
+                // Whoever held it before has removed it: ours must be the file that is there now.
+                Ok(()) if is_at(&file, &path) => return Ok(Some(Self { _file: file, path })),
+                Ok(()) => {}
+                Err(TryLockError::Error(_)) => return Ok(None),
+                Err(TryLockError::WouldBlock) => {
+                    if start.elapsed() > PATIENCE {
+                        let message = "another run has held it for 10 seconds: end that run, then try again";
+                        return Err(Error::output(path, message));
+                    }
+                    std::thread::sleep(Duration::from_millis(2));
+                }
+            }
+        }
+    }
+}
+
+impl Drop for Register {
+    fn drop(&mut self) {
+        // While still locked, so that nobody takes a lock on a file that is about to vanish without noticing.
+        if cfg!(unix) {
+            let _ = fs::remove_file(&self.path);
+        }
+    }
+}
+
+/// True if the open `file` is the one named `path` now.
+#[cfg(unix)]
+fn is_at(file: &File, path: &Path) -> bool {
+    use std::os::unix::fs::MetadataExt;
+    match (file.metadata(), fs::metadata(path)) {
+        (Ok(a), Ok(b)) => a.ino() == b.ino() && a.dev() == b.dev(),
+        _ => false,
+    }
+}
+
+/// True if the open `file` is the one named `path` now: elsewhere it is never removed.
+#[cfg(not(unix))]
+fn is_at(_: &File, _: &Path) -> bool {
+    true
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn names(range: std::ops::Range<u32>) -> Vec<String> {
+        range.map(|n| format!("a.{n:04}.exr")).collect()
+    }
+
+    #[test]
+    fn the_second_run_is_refused_only_for_the_same_frames() {
+        let folder = tempfile::tempdir().unwrap();
+        let first = FrameLock::acquire(folder.path(), &names(1..10)).unwrap();
+        assert!(first.is_held());
+        let error = FrameLock::acquire(folder.path(), &names(9..20)).unwrap_err();
+        assert_eq!(error.exit_code(), 4);
+        assert!(error.to_string().contains("a.0009.exr"), "{error}");
+        let beside = FrameLock::acquire(folder.path(), &names(10..20)).unwrap();
+        drop(first);
+        let again = FrameLock::acquire(folder.path(), &names(1..10)).unwrap();
+        drop((beside, again));
+        assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 0);
+    }
+
+    #[test]
+    fn a_dead_runs_lock_is_removed() {
+        let folder = tempfile::tempdir().unwrap();
+        fs::write(folder.path().join(".buzz-1-0.lock"), names(1..10).join("\n")).unwrap();
+        fs::write(folder.path().join(REGISTER), "").unwrap();
+        let lock = FrameLock::acquire(folder.path(), &names(1..10)).unwrap();
+        assert!(!folder.path().join(".buzz-1-0.lock").exists());
+        drop(lock);
+        assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 0);
+    }
+
+    #[test]
+    fn of_many_at_once_exactly_one_gets_the_frames() {
+        let folder = tempfile::tempdir().unwrap();
+        let results: Vec<_> = std::thread::scope(|scope| {
+            let run = || FrameLock::acquire(folder.path(), &names(1..3));
+            let threads: Vec<_> = (0..8).map(|_| scope.spawn(run)).collect();
+            threads.into_iter().map(|t| t.join().unwrap()).collect()
+        });
+        assert_eq!(results.iter().filter(|r| r.is_ok()).count(), 1);
+    }
+}

@@ -1,0 +1,32 @@
+//! Everything that leaves the program: EXR files, their names, locks and resumption, and the report.
+//!
+//! The renderer pushes finished frames into a [`crate::sequence::FrameSink`]; the sinks are here. [`ExrSink`] encodes
+//! beside the rendering of the next frame and never leaves a partial file under a frame's name.
+
+pub mod exr;
+mod folder;
+mod hash;
+mod lock;
+mod memory;
+mod naming;
+mod page;
+mod peak;
+mod report;
+mod resume;
+mod sink;
+mod write;
+
+pub use exr::{Compression, FileOptions};
+pub use folder::OutputFolder;
+pub use hash::{SettingsHash, SettingsHasher};
+pub use lock::FrameLock;
+pub use memory::{MemorySink, NullSink};
+pub use naming::{NamePattern, number_in_name};
+pub use peak::peak_bytes;
+pub use report::{
+    FrameRecord, FrameReport, IgnoredFeature, KeyFrame, Plan, Report, ReportInput, RunSeconds, SceneSummary,
+    SegmentRange, Settings, TotalSeconds, Totals,
+};
+pub use resume::FrameFile;
+pub use sink::ExrSink;
+pub(crate) use write::write_whole;

@@ -1,0 +1,176 @@
+//! File names of frames: `--name` patterns, and the frame number in a name.
+
+use crate::{Error, Result};
+
+/// A pattern for the names of a sequence's files, such as `walk.%04d.exr` or `walk.####.exr`.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct NamePattern {
+    prefix: String,
+    suffix: String,
+    /// Least number of characters, the minus sign included, as in C's `%04d`.
+    width: usize,
+}
+
+impl NamePattern {
+    /// What `--name` is when it is not given.
+    pub const DEFAULT: &str = "<stem>.%04d.exr";
+
+    /// Reads a pattern; `<stem>` in it stands for the input's name without its ending.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] if there is no frame number in it or more than one, if it names a folder, or if it does not
+    /// end in `.exr`.
+    pub fn parse(pattern: &str, stem: &str) -> Result<Self> {
+        let fail = |what: &str| {
+            Err(Error::Usage(format!("--name {pattern}: {what}; write it like {}", Self::DEFAULT)))
+        };
+        let mut parsed: Option<Self> = None;
+        let mut text = String::new();
+        let mut rest = pattern;
+        while let Some(c) = rest.chars().next() {
+            let number = match c {
+                '#' => {
+                    let width = rest.len() - rest.trim_start_matches('#').len();
+                    Some((width, &rest[width..]))
+                }
+                '%' => percent(rest),
+                _ => None,
+            };
+            if let Some((width, after)) = number {
+                if parsed.is_some() {
+                    return fail("there is more than one frame number in it");
+                }
+                if width > 20 {
+                    return fail("its frame number has more than 20 digits");
+                }
+                parsed = Some(Self { prefix: std::mem::take(&mut text), suffix: String::new(), width });
+                rest = after;
+            } else if let Some(after) = rest.strip_prefix("<stem>") {
+                text += stem;
+                rest = after;
+            } else if c == '%' {
+                let Some(after) = rest.strip_prefix("%%") else {
+                    return fail("only %d, %04d and the like, or %% for a percent sign, may follow a %");
+                };
+                text.push('%');
+                rest = after;
+            } else {
+                text.push(c);
+                rest = &rest[c.len_utf8()..];
+            }
+        }
+        let Some(mut name) = parsed else {
+            return fail("there is no frame number in it");
+        };
+        name.suffix = text;
+        let whole = name.file_name(0);
+        if whole.contains(['/', '\\', '\0']) {
+            return fail("it must be a file name, without a folder");
+        }
+        if !whole.ends_with(".exr") {
+            return fail("it must end in .exr");
+        }
+        Ok(name)
+    }
+
+    /// The name of `frame`'s file. Negative numbers are written as C's `%04d` does: `-001`.
+    pub fn file_name(&self, frame: i64) -> String {
+        format!("{}{frame:0width$}{}", self.prefix, self.suffix, width = self.width)
+    }
+}
+
+/// `%d`, `%4d` or `%04d` at the start of `text`: its width and what follows. `%4d` is padded with zeros too: a space in
+/// a file name would split it on command lines.
+fn percent(text: &str) -> Option<(usize, &str)> {
+    let digits = text.strip_prefix('%')?;
+    let after = digits.trim_start_matches(|c: char| c.is_ascii_digit());
+    let width = &digits[..digits.len() - after.len()];
+    let width = if width.is_empty() { 1 } else { width.parse().ok()? };
+    Some((width, after.strip_prefix('d')?))
+}
+
+/// The frame number in a file's name: the last run of digits before its ending; a hyphen before it is a minus sign
+/// unless it joins the number to a word (`walk-001.exr` is 1, `walk.-001.exr` is -1).
+pub fn number_in_name(name: &str) -> Option<i64> {
+    let stem = name.rsplit_once('.').map_or(name, |(stem, _)| stem);
+    let end = stem.rfind(|c: char| c.is_ascii_digit())? + 1;
+    let start = stem[..end]
+        .rfind(|c: char| !c.is_ascii_digit())
+        .map_or(0, |i| i + stem[i..].chars().next().map_or(1, char::len_utf8));
+    let number: i64 = stem[start..end].parse().ok()?;
+    let before = stem[..start].strip_suffix('-');
+    let minus = before.is_some_and(|b| !b.ends_with(char::is_alphanumeric));
+    Some(if minus { -number } else { number })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    fn name(pattern: &str, frame: i64) -> String {
+        NamePattern::parse(pattern, "walk").unwrap().file_name(frame)
+    }
+
+    #[test]
+    fn patterns_are_filled_in() {
+        assert_eq!(name(NamePattern::DEFAULT, 7), "walk.0007.exr");
+        assert_eq!(name("a_####.exr", 7), "a_0007.exr");
+        assert_eq!(name("a.%d.exr", 12345), "a.12345.exr");
+        assert_eq!(name("a.%3d.exr", 7), "a.007.exr");
+        assert_eq!(name("100%%.%02d.exr", 123), "100%.123.exr");
+        assert_eq!(name("é<stem>#.exr", 1), "éwalk1.exr");
+    }
+
+    #[test]
+    fn negative_frames_have_their_own_names() {
+        assert_eq!(name("<stem>.%04d.exr", -1), "walk.-001.exr");
+        assert_eq!(name("<stem>.####.exr", -12345), "walk.-12345.exr");
+    }
+
+    #[test]
+    fn a_pattern_that_would_not_work_is_a_usage_error() {
+        for bad in [
+            "a.exr",
+            "%04d.%04d.exr",
+            "#.#.exr",
+            "%04d",
+            "%04d.png",
+            "d/%04d.exr",
+            "%x.exr",
+            "%.exr",
+            "%99d.exr",
+        ] {
+            let error = NamePattern::parse(bad, "walk").unwrap_err();
+            assert_eq!(error.exit_code(), 2, "{bad}");
+            assert!(error.to_string().contains(bad));
+        }
+    }
+
+    #[test]
+    fn other_renderers_names_are_read_too() {
+        assert_eq!(number_in_name("shot010_v2.0101.exr"), Some(101));
+        assert_eq!(number_in_name("0001.exr"), Some(1));
+        assert_eq!(number_in_name("-0001.exr"), Some(-1));
+        assert_eq!(number_in_name("walk-0001.exr"), Some(1));
+        assert_eq!(number_in_name("walk.-0001.exr"), Some(-1));
+        assert_eq!(number_in_name("walk0012.left.exr"), Some(12));
+        assert_eq!(number_in_name("walk.exr"), None);
+        assert_eq!(number_in_name("99999999999999999999.exr"), None);
+        assert_eq!(number_in_name(""), None);
+    }
+
+    proptest! {
+        #[test]
+        fn the_number_written_is_read_back(frame in -100_000i64..100_000, width in 1usize..9) {
+            let pattern = NamePattern::parse(&format!("<stem>.%0{width}d.exr"), "a b-2").unwrap();
+            prop_assert_eq!(number_in_name(&pattern.file_name(frame)), Some(frame));
+        }
+
+        #[test]
+        fn no_name_panics(name in ".*") {
+            number_in_name(&name);
+            let _ = NamePattern::parse(&name, "s");
+        }
+    }
+}

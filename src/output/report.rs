@@ -1,0 +1,436 @@
+//! `report.json`: what was asked, what was planned, what was done and what it cost.
+
+use super::write::write_alone;
+use crate::frame::{FrameKind, FrameStats, PixelClass, RayCounts, StageSeconds};
+use crate::scene::{Ignored, Rational};
+use crate::{Error, Result};
+use serde::{Deserialize, Serialize};
+use serde_json::{Map, Value};
+use std::path::Path;
+
+/// Everything that a report is made from.
+#[derive(Debug, Clone, Default)]
+pub struct ReportInput {
+    /// The input as the user named it.
+    pub input: String,
+    /// What was asked for.
+    pub settings: Settings,
+    /// What the scene holds.
+    pub scene: SceneSummary,
+    /// The plan.
+    pub plan: Plan,
+    /// All frames of the run, in order.
+    pub frames: Vec<FrameRecord>,
+    /// Wall seconds that belong to no frame.
+    pub seconds: RunSeconds,
+    /// Most memory held, bytes: see [`super::peak_bytes`].
+    pub peak_bytes: u64,
+    /// What the user was warned of.
+    pub warnings: Vec<String>,
+}
+
+/// A frame of the run.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct FrameRecord {
+    /// Frame number.
+    pub number: i64,
+    /// How it was made.
+    pub kind: FrameKind,
+    /// Its counts and times.
+    pub stats: FrameStats,
+    /// True if it was there already, and its counts come from its file.
+    pub skipped: bool,
+}
+
+/// Wall seconds of the run that belong to no frame.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct RunSeconds {
+    /// Reading the scene.
+    pub import: f64,
+    /// Building what rays are traced through.
+    pub accel: f64,
+    /// Choosing key frames.
+    pub plan: f64,
+    /// From start to end.
+    pub wall: f64,
+}
+
+/// The report, as it is written: `buzz-report/1`.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Report {
+    /// [`Report::SCHEMA`].
+    pub schema: String,
+    /// The input as the user named it.
+    pub input: String,
+    /// What was asked for.
+    pub settings: Settings,
+    /// What the scene holds.
+    pub scene: SceneSummary,
+    /// The plan.
+    pub plan: Plan,
+    /// Sums over all frames.
+    pub totals: Totals,
+    /// All frames, in order.
+    pub frames: Vec<FrameReport>,
+    /// What the user was warned of.
+    pub warnings: Vec<String>,
+}
+
+/// What was asked for.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+pub struct Settings {
+    /// The quality's name.
+    pub quality: String,
+    /// Pixels.
+    pub width: u32,
+    /// Pixels.
+    pub height: u32,
+    /// Numerator and denominator of the frame rate.
+    pub fps: [u32; 2],
+    /// Threads for everything.
+    pub threads: usize,
+    /// Levels of super-sampling.
+    pub aa: u32,
+}
+
+impl Settings {
+    /// The frame rate as the report has it.
+    pub fn fps(rate: Rational) -> [u32; 2] {
+        [rate.numerator, rate.denominator]
+    }
+}
+
+/// What the scene holds.
+#[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
+pub struct SceneSummary {
+    /// Triangles drawn, each instance counted.
+    pub triangles: usize,
+    /// Analytic shapes.
+    pub shapes: usize,
+    /// Meshes placed in the world.
+    pub instances: usize,
+    /// Lights.
+    pub lights: usize,
+    /// [`crate::scene::Requirements::names`].
+    pub requires: Vec<String>,
+    /// What is left out.
+    pub ignored: Vec<IgnoredFeature>,
+    /// Bytes that inference keeps for each pixel.
+    pub bytes_per_pixel: usize,
+}
+
+/// A feature of the input that was not rendered.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct IgnoredFeature {
+    /// Its name in the format.
+    pub feature: String,
+    /// JSON pointer or line.
+    #[serde(rename = "where")]
+    pub place: String,
+    /// What the user sees instead.
+    pub effect: String,
+}
+
+impl From<&Ignored> for IgnoredFeature {
+    fn from(ignored: &Ignored) -> Self {
+        let Ignored { feature, place, effect } = ignored.clone();
+        Self { feature, place, effect }
+    }
+}
+
+/// The plan.
+#[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
+pub struct Plan {
+    /// Frames traced in full.
+    pub keyframes: Vec<KeyFrame>,
+    /// Runs of frames that stem from one key frame.
+    pub segments: Vec<SegmentRange>,
+    /// First frames after a cut.
+    pub cuts: Vec<i64>,
+}
+
+/// A frame traced in full, and why.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct KeyFrame {
+    /// Frame number.
+    pub frame: i64,
+    /// `first`, `cut`, `cost`, `length` or `only`.
+    pub reason: String,
+}
+
+/// A run of frames that stem from one key frame.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub struct SegmentRange {
+    /// The key frame.
+    pub key: i64,
+    /// First frame.
+    pub first: i64,
+    /// Last frame, included.
+    pub last: i64,
+}
+
+/// Sums over all frames.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Totals {
+    /// Frames.
+    pub frames: usize,
+    /// Key frames.
+    pub traced_frames: usize,
+    /// Frames made from others.
+    pub inferred_frames: usize,
+    /// Pixels of each class, by its name.
+    pub pixels: Map<String, Value>,
+    /// Rays cast.
+    pub rays: RayCounts,
+    /// Wall seconds.
+    pub seconds: TotalSeconds,
+    /// Reused samples that something hides from the eye; `None` without `--audit`.
+    pub hidden: Option<u64>,
+    /// Most memory held, bytes.
+    pub peak_bytes: u64,
+}
+
+/// Wall seconds of the whole run.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct TotalSeconds {
+    /// Reading the scene.
+    pub import: f64,
+    /// Building what rays are traced through.
+    pub accel: f64,
+    /// Choosing key frames.
+    pub plan: f64,
+    /// Work that replaces tracing.
+    pub infer: f64,
+    /// Camera and shadow rays.
+    pub trace: f64,
+    /// What depends on the eye.
+    pub enhance: f64,
+    /// Encoding and writing, beside the rest.
+    pub write: f64,
+    /// From start to end.
+    pub wall: f64,
+}
+
+/// One frame.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct FrameReport {
+    /// Frame number.
+    pub frame: i64,
+    /// `traced` or `inferred`.
+    pub kind: String,
+    /// The neighbour that an inferred frame was made from.
+    pub from: Option<i64>,
+    /// Pixels of each class, by its name.
+    pub pixels: Map<String, Value>,
+    /// Rays cast.
+    pub rays: RayCounts,
+    /// Wall seconds; 0 for skipped frames.
+    pub seconds: StageSeconds,
+    /// Reused samples that something hides from the eye; `None` without `--audit`.
+    pub hidden: Option<u64>,
+    /// True if the frame was there already.
+    pub skipped: bool,
+}
+
+impl Report {
+    /// Name and version of the format.
+    pub const SCHEMA: &str = "buzz-report/1";
+
+    /// Sums up a run.
+    pub fn new(input: ReportInput) -> Self {
+        let totals = Totals::of(&input);
+        Self {
+            schema: Self::SCHEMA.into(),
+            input: input.input,
+            settings: input.settings,
+            scene: input.scene,
+            plan: input.plan,
+            totals,
+            frames: input.frames.iter().map(FrameReport::from).collect(),
+            warnings: input.warnings,
+        }
+    }
+
+    /// Writes `report.json`, whole or not at all.
+    ///
+    /// # Errors
+    /// [`Error::Output`].
+    pub fn write_json(&self, path: &Path) -> Result<()> {
+        let mut json = serde_json::to_string_pretty(self).map_err(|e| Error::output(path, e.to_string()))?;
+        json.push('\n');
+        write_alone(path, json.as_bytes())
+    }
+}
+
+impl Totals {
+    fn of(input: &ReportInput) -> Self {
+        let mut sum = FrameStats::default();
+        let mut traced_frames = 0;
+        for FrameRecord { kind, stats, .. } in &input.frames {
+            traced_frames += usize::from(*kind == FrameKind::Traced);
+            sum.rays += stats.rays;
+            for (total, pixels) in sum.pixels.iter_mut().zip(stats.pixels) {
+                *total += pixels;
+            }
+            for (total, seconds) in [
+                (&mut sum.seconds.infer, stats.seconds.infer),
+                (&mut sum.seconds.trace, stats.seconds.trace),
+                (&mut sum.seconds.enhance, stats.seconds.enhance),
+                (&mut sum.seconds.write, stats.seconds.write),
+            ] {
+                *total += seconds;
+            }
+            if let Some(hidden) = stats.hidden {
+                *sum.hidden.get_or_insert(0) += hidden;
+            }
+        }
+        let RunSeconds { import, accel, plan, wall } = input.seconds.rounded();
+        let StageSeconds { infer, trace, enhance, write } = rounded(sum.seconds);
+        Self {
+            frames: input.frames.len(),
+            traced_frames,
+            inferred_frames: input.frames.len() - traced_frames,
+            pixels: pixels_by_name(&sum.pixels),
+            rays: sum.rays,
+            seconds: TotalSeconds { import, accel, plan, infer, trace, enhance, write, wall },
+            hidden: sum.hidden,
+            peak_bytes: input.peak_bytes,
+        }
+    }
+}
+
+impl From<&FrameRecord> for FrameReport {
+    fn from(record: &FrameRecord) -> Self {
+        let (kind, from) = match record.kind {
+            FrameKind::Traced => ("traced", None),
+            FrameKind::Inferred { from } => ("inferred", Some(from)),
+        };
+        Self {
+            frame: record.number,
+            kind: kind.into(),
+            from,
+            pixels: pixels_by_name(&record.stats.pixels),
+            rays: record.stats.rays,
+            seconds: rounded(record.stats.seconds),
+            hidden: record.stats.hidden,
+            skipped: record.skipped,
+        }
+    }
+}
+
+impl RunSeconds {
+    fn rounded(self) -> Self {
+        Self {
+            import: microseconds(self.import),
+            accel: microseconds(self.accel),
+            plan: microseconds(self.plan),
+            wall: microseconds(self.wall),
+        }
+    }
+}
+
+/// All classes by name, in the order of the contract: traced pixels last.
+fn pixels_by_name(pixels: &[u64; PixelClass::COUNT]) -> Map<String, Value> {
+    let traced_last = PixelClass::ALL.iter().skip(1).chain(&PixelClass::ALL[..1]);
+    traced_last.map(|&class| (class.name().to_string(), pixels[class as usize].into())).collect()
+}
+
+fn rounded(seconds: StageSeconds) -> StageSeconds {
+    StageSeconds {
+        infer: microseconds(seconds.infer),
+        trace: microseconds(seconds.trace),
+        enhance: microseconds(seconds.enhance),
+        write: microseconds(seconds.write),
+    }
+}
+
+/// Clocks tell no more, and seventeen digits are hard to read. What is not finite is 0: JSON has no word for it.
+fn microseconds(seconds: f64) -> f64 {
+    if seconds.is_finite() { (seconds * 1e6).round() / 1e6 } else { 0.0 }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn stats(class: PixelClass, hidden: Option<u64>) -> FrameStats {
+        let mut pixels = [0; PixelClass::COUNT];
+        pixels[class as usize] = 100;
+        let rays = RayCounts { primary: 7, shadow: 5, ..RayCounts::default() };
+        let seconds = StageSeconds { infer: 0.123_456_789, ..StageSeconds::default() };
+        FrameStats { pixels, rays, seconds, hidden }
+    }
+
+    fn report() -> Report {
+        let record = |number, kind, stats| FrameRecord { number, kind, stats, skipped: false };
+        Report::new(ReportInput {
+            input: "anim.gltf".into(),
+            settings: Settings { quality: "half-pixel".into(), fps: [24_000, 1001], ..Settings::default() },
+            frames: vec![
+                record(-1, FrameKind::Traced, stats(PixelClass::Traced, None)),
+                record(0, FrameKind::Inferred { from: -1 }, stats(PixelClass::Good, Some(3))),
+            ],
+            seconds: RunSeconds { wall: f64::NAN, ..RunSeconds::default() },
+            ..ReportInput::default()
+        })
+    }
+
+    /// The keys of the contract, as paths.
+    fn keys(value: &Value, path: &str, all: &mut Vec<String>) {
+        match value {
+            Value::Object(map) => {
+                for (key, value) in map {
+                    all.push(format!("{path}.{key}"));
+                    keys(value, &format!("{path}.{key}"), all);
+                }
+            }
+            Value::Array(values) => values.iter().take(1).for_each(|v| keys(v, &format!("{path}[]"), all)),
+            _ => {}
+        }
+    }
+
+    #[test]
+    fn every_key_of_the_contract_is_there_in_its_order() {
+        let contract: Value = serde_json::from_str(
+            r#"{ "schema":"buzz-report/1", "input":"", "settings":{"quality":"","width":0,"height":0,"fps":[24,1],"threads":2,"aa":1},
+            "scene":{"triangles":0,"shapes":0,"instances":0,"lights":0,"requires":[],"ignored":[],"bytes_per_pixel":0},
+            "plan":{"keyframes":[],"segments":[],"cuts":[]},
+            "totals":{"frames":0,"traced_frames":0,"inferred_frames":0,"pixels":{"good":0,"overlapped":0,"missed":0,"bad":0,"creeping":0,"entering":0,"edge":0,"moved":0,"filled":0,"traced":0},
+            "rays":{"primary":0,"shadow":0,"ambient":0,"reflection":0,"refraction":0,"visibility":0},
+            "seconds":{"import":0,"accel":0,"plan":0,"infer":0,"trace":0,"enhance":0,"write":0,"wall":0},"hidden":null,"peak_bytes":0},
+            "frames":[{"frame":2,"kind":"","from":1,"pixels":{"good":0,"overlapped":0,"missed":0,"bad":0,"creeping":0,"entering":0,"edge":0,"moved":0,"filled":0,"traced":0},
+            "rays":{"primary":0,"shadow":0,"ambient":0,"reflection":0,"refraction":0,"visibility":0},"seconds":{"infer":0,"trace":0,"enhance":0,"write":0}}] }"#,
+        )
+        .unwrap();
+        let (mut want, mut have) = (Vec::new(), Vec::new());
+        keys(&contract, "", &mut want);
+        keys(&serde_json::to_value(report()).unwrap(), "", &mut have);
+        have.retain(|key| want.contains(key));
+        assert_eq!(have, want);
+    }
+
+    #[test]
+    fn sums_and_rounding() {
+        let report = report();
+        assert_eq!(
+            (report.totals.frames, report.totals.traced_frames, report.totals.inferred_frames),
+            (2, 1, 1)
+        );
+        assert_eq!(report.totals.pixels["traced"], 100);
+        assert_eq!(report.totals.pixels["good"], 100);
+        assert_eq!(report.totals.rays.primary, 14);
+        assert_eq!(report.totals.hidden, Some(3));
+        assert_eq!(report.frames[1].seconds.infer, 0.123_457);
+        assert_eq!(report.totals.seconds.wall, 0.0);
+        assert_eq!((report.frames[0].from, report.frames[1].from), (None, Some(-1)));
+    }
+
+    #[test]
+    fn what_is_written_reads_back() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("new/report.json");
+        report().write_json(&path).unwrap();
+        let read: Report = serde_json::from_slice(&std::fs::read(path).unwrap()).unwrap();
+        assert_eq!(read, report());
+    }
+}

@@ -1,0 +1,137 @@
+//! Files that are whole or not there: written beside their place under another name, forced to disk, then renamed.
+
+use crate::{Error, Result};
+use std::collections::HashSet;
+use std::fs::{self, File};
+use std::io::{self, Write};
+use std::path::{Path, PathBuf};
+
+/// Writes `parts` one after the other as the file `path`.
+///
+/// # Errors
+/// [`Error::Output`]; then nothing is left behind, and what was at `path` before is still there.
+pub(crate) fn write_whole<'a>(path: &Path, parts: impl IntoIterator<Item = &'a [u8]>) -> Result<()> {
+    let temporary = temporary_name(path);
+    write_and_rename(&temporary, path, parts).map_err(|error| {
+        // It may not exist; the error that matters is the first one.
+        let _ = fs::remove_file(&temporary);
+        explain(path, &error)
+    })
+}
+
+/// [`write_whole`] of a file that no other run writes: makes its folder if need be, and removes what a killed run left.
+pub(super) fn write_alone(path: &Path, bytes: &[u8]) -> Result<()> {
+    let folder = match path.parent() {
+        Some(folder) if !folder.as_os_str().is_empty() => folder,
+        _ => Path::new("."),
+    };
+    fs::create_dir_all(folder).map_err(|e| explain(folder, &e))?;
+    let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+    remove_leftovers(folder, &HashSet::from([name]))?;
+    write_whole(path, [bytes])
+}
+
+fn write_and_rename<'a>(
+    temporary: &Path,
+    path: &Path,
+    parts: impl IntoIterator<Item = &'a [u8]>,
+) -> io::Result<()> {
+    let mut file = File::create(temporary)?;
+    for part in parts {
+        file.write_all(part)?;
+    }
+    // A rename may reach the disk before the contents do: without this, a power cut leaves an empty frame.
+    file.sync_all()?;
+    drop(file);
+    fs::rename(temporary, path)
+}
+
+/// `.<name>.<process>.tmp` in the same folder: a rename across file systems would not be atomic.
+fn temporary_name(path: &Path) -> PathBuf {
+    let name = path.file_name().unwrap_or_default().to_string_lossy();
+    path.with_file_name(format!(".{name}.{}.tmp", std::process::id()))
+}
+
+/// Removes what killed runs left of the files `names` in `folder`. Call it only while nobody else may write them.
+pub(super) fn remove_leftovers(folder: &Path, names: &HashSet<String>) -> Result<()> {
+    let entries = fs::read_dir(folder).map_err(|e| explain(folder, &e))?;
+    for entry in entries {
+        let entry = entry.map_err(|e| explain(folder, &e))?;
+        let ours = entry.file_name().to_str().and_then(temporary_of).is_some_and(|name| names.contains(name));
+        if ours {
+            fs::remove_file(entry.path()).map_err(|e| explain(&entry.path(), &e))?;
+        }
+    }
+    Ok(())
+}
+
+/// The file for which `name` is a temporary name.
+fn temporary_of(name: &str) -> Option<&str> {
+    let (name, process) = name.strip_prefix('.')?.strip_suffix(".tmp")?.rsplit_once('.')?;
+    (!process.is_empty() && process.bytes().all(|b| b.is_ascii_digit())).then_some(name)
+}
+
+/// An error of the file system, with what the user can do about it.
+pub(super) fn explain(path: &Path, error: &io::Error) -> Error {
+    let advice = match error.kind() {
+        io::ErrorKind::StorageFull | io::ErrorKind::QuotaExceeded => {
+            ": free some space, then run again with --skip-existing"
+        }
+        io::ErrorKind::PermissionDenied | io::ErrorKind::ReadOnlyFilesystem => {
+            ": choose a folder that may be written to"
+        }
+        io::ErrorKind::NotADirectory => ": it must be a folder",
+        io::ErrorKind::StaleNetworkFileHandle | io::ErrorKind::TimedOut => {
+            ": see whether the folder is still connected, then run again with --skip-existing"
+        }
+        _ => "",
+    };
+    Error::output(path, format!("{error}{advice}"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn listing(folder: &Path) -> Vec<String> {
+        let mut names: Vec<String> =
+            fs::read_dir(folder).unwrap().map(|e| e.unwrap().file_name().into_string().unwrap()).collect();
+        names.sort();
+        names
+    }
+
+    #[test]
+    fn a_file_is_whole_and_alone() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.0001.exr");
+        write_whole(&path, [b"one".as_slice(), b"two"]).unwrap();
+        write_whole(&path, [b"three".as_slice()]).unwrap();
+        assert_eq!(fs::read(&path).unwrap(), b"three");
+        assert_eq!(listing(folder.path()), ["a.0001.exr"]);
+    }
+
+    #[test]
+    fn a_failed_write_leaves_nothing() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.0001.exr");
+        fs::create_dir(&path).unwrap();
+        fs::write(path.join("kept"), "").unwrap();
+        let error = write_whole(&path, [b"one".as_slice()]).unwrap_err();
+        assert_eq!(error.exit_code(), 4);
+        assert_eq!(listing(folder.path()), ["a.0001.exr"]);
+    }
+
+    #[test]
+    fn only_our_own_leftovers_are_removed() {
+        let folder = tempfile::tempdir().unwrap();
+        let kept =
+            [".a.0002.exr.12.tmp", ".a.0001.exr.x.tmp", ".a.0001.exr.tmp", "a.0001.exr.12.tmp", "a.0001.exr"];
+        for name in kept.iter().chain(&[".a.0001.exr.12.tmp", ".a.0001.exr.345.tmp"]) {
+            fs::write(folder.path().join(name), "").unwrap();
+        }
+        remove_leftovers(folder.path(), &HashSet::from(["a.0001.exr".to_string()])).unwrap();
+        let mut kept = kept.map(String::from).to_vec();
+        kept.sort();
+        assert_eq!(listing(folder.path()), kept);
+    }
+}

@@ -1,0 +1,317 @@
+//! The driver: the only place that knows planning, tracing and inference. Pushes finished frames into a [`FrameSink`].
+//!
+//! [`camera_path`] gives the planner what it asks for, [`crate::plan::plan`] decides, [`render_sequence`] renders.
+
+mod path;
+mod resolve;
+
+pub use path::camera_path;
+
+use crate::accel::Accel;
+use crate::error::{Error, Result};
+use crate::frame::{
+    Aov, AovSet, Frame, FrameKind, FrameStats, PixelClass, RayCounts, StageSeconds, SurfaceSample, Window,
+};
+use crate::infer::{BuzzBuffer, CastRays, Inference, Projector};
+use crate::plan::{Plan, Segment};
+use crate::scene::{Pose, Scene, View};
+use crate::trace::{TraceOptions, Tracer};
+use glam::DVec3;
+use resolve::{Neighbour, Resolver, count_hidden, empty_frame};
+use std::collections::BTreeSet;
+use std::time::Instant;
+
+/// Where finished frames go: EXR files, memory, or nowhere.
+pub trait FrameSink {
+    /// A frame whose buffers may be filled: one that has been written already, or none.
+    fn blank(&mut self) -> Option<Frame>;
+
+    /// Takes a finished frame. May return before it is written: encoding runs beside the next frame's rendering.
+    fn put(&mut self, frame: Frame) -> Result<()>;
+
+    /// Waits until all frames are written. Returns the seconds that each frame's encoding and writing took.
+    fn finish(&mut self) -> Result<Vec<(i64, StageSeconds)>>;
+}
+
+/// How accurate an inferred frame is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Quality {
+    /// Every frame is traced.
+    Full,
+    /// The paper's guarantee: every sample lies inside its pixel.
+    #[default]
+    HalfPixel,
+}
+
+impl Quality {
+    /// The word on the command line and in reports.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Full => "full",
+            Self::HalfPixel => "half-pixel",
+        }
+    }
+}
+
+/// How to render a sequence.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Settings {
+    /// Full image, pixels.
+    pub width: u32,
+    /// Full image, pixels.
+    pub height: u32,
+    /// The part that is rendered.
+    pub window: Window,
+    /// Layers beside the beauty.
+    pub aovs: AovSet,
+    /// Colour and alpha are 0 where only the world is seen.
+    pub transparent: bool,
+    /// Stops.
+    pub exposure: f32,
+    /// Depth of reflection and refraction.
+    pub bounces: u32,
+    /// Cast a ray to every reused sample and count those that something hides.
+    pub audit: bool,
+    /// The camera to use throughout, instead of the scene's cuts.
+    pub camera: Option<usize>,
+}
+
+impl Settings {
+    /// The whole image, beauty only.
+    pub fn new(width: u32, height: u32) -> Self {
+        Self {
+            width,
+            height,
+            window: Window { x: 0, y: 0, width, height },
+            aovs: AovSet::default(),
+            transparent: false,
+            exposure: 0.0,
+            bounces: 4,
+            audit: false,
+            camera: None,
+        }
+    }
+}
+
+/// Told what happens, and asked whether to go on.
+pub trait Observer {
+    /// A frame is finished; if it was `wanted` it has been given to the sink, otherwise others hang on it.
+    fn frame_done(&mut self, number: i64, kind: FrameKind, stats: &FrameStats, wanted: bool);
+
+    /// The signal by which the user asked to stop, if so.
+    fn stop_requested(&self) -> Option<i32> {
+        None
+    }
+}
+
+/// Renders `frames` as `plan` says and gives each to `sink`, in the plan's order: a segment's key frame, what is before
+/// it, then what is after it.
+///
+/// Frames that are not asked for are still inferred where a wanted one hangs on them, but neither shaded nor written.
+pub fn render_sequence(
+    scene: &Scene,
+    accel: &mut Accel,
+    settings: &Settings,
+    plan: &Plan,
+    frames: &BTreeSet<i64>,
+    sink: &mut dyn FrameSink,
+    observer: &mut dyn Observer,
+) -> Result<()> {
+    let mut buffers = Buffers::default();
+    let beyond: Vec<Segment> = frames
+        .iter()
+        .filter(|&&f| plan.segment_of(f).is_none())
+        .map(|&f| Segment { key: f, first: f, last: f })
+        .collect();
+    for segment in plan.segments.iter().chain(&beyond) {
+        let wanted: BTreeSet<i64> = frames.range(segment.first..=segment.last).copied().collect();
+        if !wanted.is_empty() {
+            render_segment(
+                scene,
+                accel,
+                settings,
+                segment,
+                &plan.cuts,
+                &wanted,
+                &mut buffers,
+                sink,
+                observer,
+            )?;
+        }
+    }
+    Ok(())
+}
+
+/// What inference needs between frames; swapped, never made anew.
+#[derive(Default)]
+struct Buffers {
+    key: BuzzBuffer,
+    old: BuzzBuffer,
+    new: BuzzBuffer,
+    inference: Inference,
+}
+
+impl Buffers {
+    fn fit(&mut self, window: Window, lit_words: usize) {
+        let (width, height) = (window.width as usize, window.height as usize);
+        for buffer in [&mut self.key, &mut self.old, &mut self.new] {
+            if (buffer.width(), buffer.height(), buffer.lit_words()) != (width, height, lit_words) {
+                *buffer = BuzzBuffer::new(width, height, lit_words);
+            }
+        }
+    }
+}
+
+#[allow(clippy::too_many_arguments)] // Private, called once: the arguments are the function's whole world.
+fn render_segment(
+    scene: &Scene,
+    accel: &mut Accel,
+    settings: &Settings,
+    segment: &Segment,
+    cuts: &[i64],
+    wanted: &BTreeSet<i64>,
+    buffers: &mut Buffers,
+    sink: &mut dyn FrameSink,
+    observer: &mut dyn Observer,
+) -> Result<()> {
+    // Nothing but the camera moves within a segment, so the key frame's pose holds for all of it.
+    let pose = scene.pose(scene.timing.time_of(segment.key));
+    let origin = shot(scene, settings, segment.key).view.eye;
+    accel.place(scene, &pose, origin);
+    let accel = &*accel;
+    let tracer = Tracer::new(scene, accel, &pose, TraceOptions { bounces: settings.bounces });
+    buffers.fit(settings.window, tracer.lit_words());
+    let mut emitter =
+        Emitter { scene, settings, accel, tracer: &tracer, origin, cuts, wanted, sink, observer };
+    let Buffers { key, old, new, inference } = buffers;
+
+    let key_shot = shot(scene, settings, segment.key);
+    let start = Instant::now();
+    key.forget(PixelClass::Traced);
+    let rays =
+        key.cast_unknown(&Projector::new(&key_shot.view, origin), &Caster::new(&tracer, &key_shot.view));
+    let mut stats = FrameStats { rays, ..FrameStats::default() };
+    stats.seconds.trace = start.elapsed().as_secs_f64();
+    emitter.emit(segment.key, FrameKind::Traced, &key_shot, key, stats)?;
+
+    // Outward, as far as a wanted frame lies.
+    let before = wanted.first().copied().unwrap_or(segment.key)..segment.key;
+    let after = segment.key + 1..=wanted.last().copied().unwrap_or(segment.key);
+    for frames in [before.rev().collect::<Vec<_>>(), after.collect()] {
+        let mut from = shot(scene, settings, segment.key);
+        for (i, &number) in frames.iter().enumerate() {
+            let to = shot(scene, settings, number);
+            let source = if i == 0 { &*key } else { &*old };
+            let start = Instant::now();
+            let caster = Caster::new(&tracer, &to.view);
+            let cost = inference.infer((source, &from.view), (new, &to.view), origin, &caster);
+            let mut stats = FrameStats { rays: cost.rays, ..FrameStats::default() };
+            stats.seconds.trace = cost.tracing.as_secs_f64();
+            stats.seconds.infer = start.elapsed().as_secs_f64() - stats.seconds.trace;
+            emitter.emit(number, segment.kind(number), &to, new, stats)?;
+            std::mem::swap(old, new);
+            from = to;
+        }
+    }
+    Ok(())
+}
+
+/// The camera at a frame: the rendered window as a view of its own, and the whole image.
+struct Shot {
+    camera: usize,
+    view: View,
+    full_view: View,
+    pose: Pose,
+}
+
+fn shot(scene: &Scene, settings: &Settings, frame: i64) -> Shot {
+    let pose = scene.pose(scene.timing.time_of(frame));
+    let camera = scene.camera_at(frame, settings.camera);
+    let full_view = scene.view(&pose, camera, settings.width, settings.height);
+    Shot { camera, view: full_view.cropped(settings.window), full_view, pose }
+}
+
+/// The tracer as inference wants it.
+struct Caster<'a> {
+    tracer: &'a Tracer<'a>,
+    view: &'a View,
+}
+
+impl<'a> Caster<'a> {
+    fn new(tracer: &'a Tracer<'a>, view: &'a View) -> Self {
+        Self { tracer, view }
+    }
+}
+
+impl CastRays for Caster<'_> {
+    fn cast(&self, x: usize, y: usize, lit: &mut [u32], counts: &mut RayCounts) -> SurfaceSample {
+        self.tracer.cast(self.view, x as f64 + 0.5, y as f64 + 0.5, lit, counts)
+    }
+}
+
+/// Turns samples into frames and hands them over.
+struct Emitter<'a> {
+    scene: &'a Scene,
+    settings: &'a Settings,
+    accel: &'a Accel,
+    tracer: &'a Tracer<'a>,
+    origin: DVec3,
+    cuts: &'a [i64],
+    wanted: &'a BTreeSet<i64>,
+    sink: &'a mut dyn FrameSink,
+    observer: &'a mut dyn Observer,
+}
+
+impl Emitter<'_> {
+    fn emit(
+        &mut self,
+        number: i64,
+        kind: FrameKind,
+        shot: &Shot,
+        buffer: &BuzzBuffer,
+        mut stats: FrameStats,
+    ) -> Result<()> {
+        if self.wanted.contains(&number) {
+            let start = Instant::now();
+            stats.pixels = buffer.count_classes();
+            let mut frame = self.sink.blank().unwrap_or_else(|| empty_frame(shot.full_view));
+            frame.number = number;
+            frame.kind = kind;
+            frame.view = shot.full_view;
+            frame.camera.clone_from(&self.scene.cameras[shot.camera].name);
+            let resolver = Resolver {
+                scene: self.scene,
+                settings: self.settings,
+                tracer: self.tracer,
+                origin: self.origin,
+                shot,
+                next: self.neighbour(shot, number + 1, self.cuts.contains(&(number + 1))),
+                previous: self.neighbour(shot, number - 1, self.cuts.contains(&number)),
+            };
+            stats.rays += resolver.resolve(buffer, &mut frame);
+            stats.seconds.enhance = start.elapsed().as_secs_f64();
+            if self.settings.audit {
+                stats.hidden = Some(count_hidden(self.tracer, &shot.view, buffer));
+            }
+            frame.stats = stats;
+            self.sink.put(frame)?;
+        }
+        self.observer.frame_done(number, kind, &stats, self.wanted.contains(&number));
+        match self.observer.stop_requested() {
+            Some(signal) => Err(Error::Interrupted { signal }),
+            None => Ok(()),
+        }
+    }
+
+    /// The frame next to `shot`, for motion; none across a cut or outside the range.
+    fn neighbour(&self, shot: &Shot, number: i64, is_cut: bool) -> Option<Neighbour> {
+        let timing = &self.scene.timing;
+        let wanted = self.settings.aovs.contains(Aov::Motion) && !is_cut;
+        let inside = (timing.first..=timing.last).contains(&number);
+        let other = (wanted && inside).then(|| self::shot(self.scene, self.settings, number));
+        other.filter(|o| o.camera == shot.camera).map(|o| {
+            let moved = !self.scene.looks_alike(&shot.pose, &o.pose);
+            Neighbour { view: o.view, surfaces: moved.then(|| self.accel.displaced(self.scene, &o.pose)) }
+        })
+    }
+}

@@ -1,0 +1,219 @@
+//! From samples to a frame's layers: the paper's enhancement of every pixel, traced or reused alike.
+
+use super::{Settings, Shot};
+use crate::accel::Displaced;
+use crate::frame::{Aov, Frame, FrameKind, FrameStats, RayCounts, SurfaceSample, Window};
+use crate::infer::BuzzBuffer;
+use crate::scene::{Scene, View};
+use crate::trace::Tracer;
+use glam::{DVec3, DVec4, Vec3};
+use rayon::prelude::*;
+
+/// Everything that a pixel's final values depend on besides its sample.
+pub(super) struct Resolver<'a> {
+    pub scene: &'a Scene,
+    pub settings: &'a Settings,
+    pub tracer: &'a Tracer<'a>,
+    /// Sample positions are relative to this.
+    pub origin: DVec3,
+    pub shot: &'a Shot,
+    /// The frame after, where motion is asked for and there is one.
+    pub next: Option<Neighbour>,
+    /// The frame before.
+    pub previous: Option<Neighbour>,
+}
+
+/// The layers of one pixel that come from shading.
+struct Pixel {
+    color: [f32; 4],
+    diffuse: Vec3,
+    specular: Vec3,
+    emission: Vec3,
+}
+
+impl Resolver<'_> {
+    /// Fills the layers that the settings ask for; returns the rays that reflection and refraction took.
+    pub fn resolve(&self, buffer: &BuzzBuffer, frame: &mut Frame) -> RayCounts {
+        let window = self.settings.window;
+        frame.window = window;
+        let pixels = window.pixels();
+        frame.color.resize(pixels, [0.0; 4]);
+        let wants = |aov| self.settings.aovs.contains(aov);
+        let size = |aov| if wants(aov) { pixels } else { 0 };
+        frame.diffuse.resize(size(Aov::Diffuse), [0.0; 3]);
+        frame.specular.resize(size(Aov::Specular), [0.0; 3]);
+        frame.emission.resize(size(Aov::Emission), [0.0; 3]);
+        let counts = self.shade(buffer, frame, window.width as usize);
+
+        fill(&mut frame.depth, size(Aov::Depth), |i| finite_depth(buffer.z[i]));
+        fill(&mut frame.class, size(Aov::Class), |i| buffer.class[i] as u8);
+        fill(&mut frame.object, size(Aov::Object), |i| buffer.object[i]);
+        fill(&mut frame.normal, size(Aov::Normal), |i| {
+            self.on_surface(buffer, i, |s| self.tracer.shading_normal(&self.shot.view, s))
+        });
+        fill(&mut frame.position, size(Aov::Position), |i| {
+            self.on_surface(buffer, i, |s| (s.position.as_dvec3() + self.origin).as_vec3())
+        });
+        fill(&mut frame.forward, size(Aov::Motion), |i| {
+            self.motion(&buffer.sample(i), self.next.as_ref(), 1.0)
+        });
+        fill(&mut frame.backward, size(Aov::Motion), |i| {
+            self.motion(&buffer.sample(i), self.previous.as_ref(), -1.0)
+        });
+        let lights = if wants(Aov::Lights) { self.scene.lights.len() } else { 0 };
+        frame.lights.resize_with(lights, Default::default);
+        let gain = self.settings.exposure.exp2();
+        for (number, (name, layer)) in frame.lights.iter_mut().enumerate() {
+            name.clone_from(&self.scene.lights[number].name);
+            fill(layer, pixels, |i| {
+                self.on_surface(buffer, i, |s| {
+                    self.tracer.light_diffuse(&self.shot.view, s, buffer.lit(i), number) * gain
+                })
+            });
+        }
+        counts
+    }
+
+    fn shade(&self, buffer: &BuzzBuffer, frame: &mut Frame, width: usize) -> RayCounts {
+        let shade_row = |y: usize, row: Row<'_>| {
+            let mut counts = RayCounts::default();
+            for (x, color) in row.color.iter_mut().enumerate() {
+                let i = y * width + x;
+                let pixel = self.pixel(&buffer.sample(i), buffer.lit(i), &mut counts);
+                *color = pixel.color;
+                for (layer, value) in [
+                    (&mut *row.diffuse, pixel.diffuse),
+                    (&mut *row.specular, pixel.specular),
+                    (&mut *row.emission, pixel.emission),
+                ] {
+                    if let Some(texel) = layer.get_mut(x) {
+                        *texel = value.to_array();
+                    }
+                }
+            }
+            counts
+        };
+        let rows: Vec<Row<'_>> = rows(frame, width);
+        rows.into_par_iter().enumerate().map(|(y, row)| shade_row(y, row)).reduce(
+            RayCounts::default,
+            |mut a, b| {
+                a += b;
+                a
+            },
+        )
+    }
+
+    fn pixel(&self, sample: &SurfaceSample, lit: &[u32], counts: &mut RayCounts) -> Pixel {
+        let radiance = self.tracer.shade(&self.shot.view, sample, lit, counts);
+        let gain = self.settings.exposure.exp2();
+        let (diffuse, specular, emission) =
+            (radiance.diffuse * gain, radiance.specular * gain, radiance.emission * gain);
+        if sample.surface.is_background() && self.settings.transparent {
+            return Pixel {
+                color: [0.0; 4],
+                diffuse: Vec3::ZERO,
+                specular: Vec3::ZERO,
+                emission: Vec3::ZERO,
+            };
+        }
+        let rgb = diffuse + specular + emission;
+        Pixel { color: rgb.extend(radiance.alpha).to_array(), diffuse, specular, emission }
+    }
+
+    /// A value of a pixel that shows a surface; 0 for the background.
+    fn on_surface(&self, buffer: &BuzzBuffer, i: usize, value: impl Fn(&SurfaceSample) -> Vec3) -> [f32; 3] {
+        let sample = buffer.sample(i);
+        if sample.surface.is_background() { [0.0; 3] } else { value(&sample).to_array() }
+    }
+
+    /// Pixels, x right and y up, that the sample moves on the image between this frame and `other`, in the direction
+    /// of time: `sign` is 1 if `other` is later, -1 if it is earlier.
+    fn motion(&self, sample: &SurfaceSample, other: Option<&Neighbour>, sign: f32) -> [f32; 2] {
+        let Some(other) = other else { return [0.0; 2] };
+        let here = sample.position.as_dvec3();
+        let (here, there) = if sample.surface.is_background() {
+            (here.extend(0.0), here.extend(0.0))
+        } else {
+            let there =
+                other.surfaces.as_ref().map_or(sample.position, |s| s.point(self.scene, sample.surface));
+            (here.extend(1.0), there.as_dvec3().extend(1.0))
+        };
+        let raster = |view: &View, p: DVec4| {
+            let r = view.raster_from_world(self.origin) * p;
+            (r.w > 0.0).then(|| (r.x / r.w, r.y / r.w))
+        };
+        match (raster(&self.shot.view, here), raster(&other.view, there)) {
+            (Some(a), Some(b)) => [sign * (b.0 - a.0) as f32, -sign * (b.1 - a.1) as f32],
+            _ => [0.0; 2],
+        }
+    }
+}
+
+/// The frame before or after, as motion needs it.
+pub(super) struct Neighbour {
+    pub view: View,
+    /// Where surfaces are then; none where nothing but the camera moves.
+    pub surfaces: Option<Displaced>,
+}
+
+/// One row of the layers that shading fills; empty where not asked for.
+struct Row<'a> {
+    color: &'a mut [[f32; 4]],
+    diffuse: &'a mut [[f32; 3]],
+    specular: &'a mut [[f32; 3]],
+    emission: &'a mut [[f32; 3]],
+}
+
+fn rows(frame: &mut Frame, width: usize) -> Vec<Row<'_>> {
+    let mut diffuse = frame.diffuse.chunks_mut(width);
+    let mut specular = frame.specular.chunks_mut(width);
+    let mut emission = frame.emission.chunks_mut(width);
+    let row = |color| Row {
+        color,
+        diffuse: diffuse.next().unwrap_or_default(),
+        specular: specular.next().unwrap_or_default(),
+        emission: emission.next().unwrap_or_default(),
+    };
+    frame.color.chunks_mut(width).map(row).collect()
+}
+
+/// Computes a layer of `size` pixels in parallel.
+fn fill<T: Send + Clone + Default>(layer: &mut Vec<T>, size: usize, value: impl Fn(usize) -> T + Sync) {
+    layer.resize(size, T::default());
+    layer.par_iter_mut().with_min_len(1 << 12).enumerate().for_each(|(i, texel)| *texel = value(i));
+}
+
+fn finite_depth(z: f32) -> f32 {
+    z.min(Frame::FAR_DEPTH)
+}
+
+/// Reused samples that something hides from the eye (the audit).
+pub(super) fn count_hidden(tracer: &Tracer<'_>, view: &View, buffer: &BuzzBuffer) -> u64 {
+    let pixels = (0..buffer.class.len()).into_par_iter();
+    let hidden = |&i: &usize| buffer.class[i].is_reused() && tracer.is_hidden(view, &buffer.sample(i));
+    pixels.filter(hidden).count() as u64
+}
+
+/// A frame without pixels.
+pub(super) fn empty_frame(view: View) -> Frame {
+    Frame {
+        number: 0,
+        kind: FrameKind::Traced,
+        view,
+        camera: String::new(),
+        window: Window { x: 0, y: 0, width: 0, height: 0 },
+        color: Vec::new(),
+        depth: Vec::new(),
+        class: Vec::new(),
+        normal: Vec::new(),
+        position: Vec::new(),
+        forward: Vec::new(),
+        backward: Vec::new(),
+        object: Vec::new(),
+        diffuse: Vec::new(),
+        specular: Vec::new(),
+        emission: Vec::new(),
+        lights: Vec::new(),
+        stats: FrameStats::default(),
+    }
+}

@@ -1,0 +1,112 @@
+//! Sequences of files against each other, ours and another renderer's.
+
+#![allow(missing_docs, clippy::unwrap_used, clippy::expect_used, clippy::panic)]
+
+mod support;
+
+use buzz::frame::{Frame, FrameKind};
+use buzz::measure::{Comparison, Exposure, compare, psnr, read_frame};
+use buzz::output::Compression;
+use buzz::output::exr::encode;
+use std::fs;
+use std::path::Path;
+use support::{Shape, default_layers, frame, options};
+
+fn plain(number: i64, kind: FrameKind) -> Frame {
+    default_layers(frame(number, kind, &Shape::whole(24, 16)))
+}
+
+fn write(folder: &Path, name: &str, frame: &Frame) {
+    fs::create_dir_all(folder).unwrap();
+    fs::write(folder.join(name), encode(frame, &options(Compression::Zip)).unwrap().parts.concat()).unwrap();
+}
+
+#[test]
+fn a_sequence_is_compared_frame_by_frame() {
+    let folder = tempfile::tempdir().unwrap();
+    let (a, b) = (folder.path().join("a"), folder.path().join("b"));
+    for number in 1..=4 {
+        let kind = if number == 1 { FrameKind::Traced } else { FrameKind::Inferred { from: 1 } };
+        let mut frame = plain(number, kind);
+        write(&b, &format!("other_{number:03}.exr"), &frame);
+        // Frames 1 and 2 stay as they are, 3 is a little off, 4 more so.
+        frame.color[5][1] += 0.1 * (number - 2).max(0) as f32;
+        write(&a, &format!("walk.{number:04}.exr"), &frame);
+    }
+    write(&a, "walk.0009.exr", &plain(9, FrameKind::Traced));
+    write(&b, "other_000.exr", &plain(0, FrameKind::Traced));
+    fs::write(a.join(".walk.0008.exr.12.tmp"), "").unwrap();
+    fs::write(a.join("report.json"), "").unwrap();
+
+    let result = compare(&a, &b).unwrap();
+    assert_eq!(result.frames.iter().map(|f| f.frame).collect::<Vec<_>>(), [1, 2, 3, 4]);
+    assert_eq!(result.unmatched.sequence, ["walk.0009.exr"]);
+    assert_eq!(result.unmatched.reference, ["other_000.exr"]);
+    assert_eq!(result.frames[0].error.psnr_db, None);
+    assert_eq!(result.worst.frame, 4);
+    assert_eq!((result.mean.frames, result.inferred_mean.frames), (2, 2));
+    let db: Vec<f64> = result.frames.iter().filter_map(|f| f.error.psnr_db).collect();
+    assert!((result.mean.psnr_db.unwrap() - (db[0] + db[1]) / 2.0).abs() < 1e-12);
+    assert!(result.frames[3].error.over_5_percent > 0.0 && result.frames[3].error.flip_mean > 0.0);
+
+    // The same by the functions on memory.
+    let read = |folder: &Path, name: &str| read_frame(&folder.join(name)).unwrap().color;
+    let all: Vec<_> = (1..=4).map(|n| read(&b, &format!("other_{n:03}.exr"))).collect();
+    let exposure = Exposure::of(all.iter().map(Vec::as_slice));
+    assert_eq!(exposure.scale, result.exposure);
+    assert_eq!(psnr(&read(&a, "walk.0004.exr"), &all[3], exposure), result.frames[3].error.psnr_db);
+
+    let json = serde_json::to_value(&result).unwrap();
+    assert!(json["frames"][0]["psnr_db"].is_null());
+    for key in ["frame", "psnr_db", "flip_mean", "max_abs", "over_5_percent"] {
+        assert!(json["frames"][3][key].is_number() && json["worst"][key].is_number(), "{key}");
+    }
+    assert!(json["mean"]["psnr_db"].is_number());
+    assert_eq!(serde_json::from_value::<Comparison>(json).unwrap().frames.len(), 4);
+    let text = result.to_string();
+    assert!(
+        text.contains("worst (4)") && text.contains("same") && text.contains("only in the reference"),
+        "{text}"
+    );
+}
+
+#[test]
+fn several_sequences_in_a_folder_are_kept_apart() {
+    let folder = tempfile::tempdir().unwrap();
+    let (a, b) = (folder.path().join("a"), folder.path().join("b"));
+    for side in ["left", "right"] {
+        for number in [-1, 1] {
+            let name = format!("walk.{side}.{number:04}.exr");
+            write(&a, &name, &plain(number, FrameKind::Traced));
+            write(&b, &name, &plain(number, FrameKind::Traced));
+        }
+    }
+    let result = compare(&a, &b).unwrap();
+    assert_eq!(result.frames.iter().map(|f| f.frame).collect::<Vec<_>>(), [-1, 1, -1, 1]);
+    assert_eq!((result.worst.error.psnr_db, result.mean.psnr_db), (None, None));
+}
+
+#[test]
+fn what_cannot_be_compared_is_an_error_that_names_it() {
+    let folder = tempfile::tempdir().unwrap();
+    let (a, b) = (folder.path().join("a"), folder.path().join("b"));
+    assert_eq!(compare(&a, &b).unwrap_err().exit_code(), 3);
+    write(&a, "walk.0001.exr", &plain(1, FrameKind::Traced));
+    write(&b, "walk.0002.exr", &plain(1, FrameKind::Traced));
+    assert!(compare(&a, &b).unwrap_err().to_string().contains("frame number"));
+    write(&b, "walk.0001.exr", &default_layers(frame(1, FrameKind::Traced, &Shape::whole(12, 16))));
+    assert!(compare(&a, &b).unwrap_err().to_string().contains("24x16"));
+    fs::write(b.join("walk.0001.exr"), "not an image").unwrap();
+    let error = compare(&a, &b).unwrap_err();
+    assert!(error.to_string().contains("walk.0001.exr"), "{error}");
+}
+
+#[test]
+fn other_layers_come_back_too() {
+    let folder = tempfile::tempdir().unwrap();
+    let frame = plain(3, FrameKind::Inferred { from: 2 });
+    write(folder.path(), "a.1.exr", &frame);
+    let read = read_frame(&folder.path().join("a.1.exr")).unwrap();
+    assert_eq!((read.width, read.height, read.kind), (24, 16, Some(frame.kind)));
+    assert_eq!((read.depth, read.class), (frame.depth, frame.class));
+}
