@@ -1,7 +1,7 @@
 //! Rays through both levels of trees.
 
-use super::opacity::{self, CULL_BACK, EYE_PASS, EYE_TEST, SHADOW_PASS, SHADOW_TEST};
-use super::tree::{Bounds, Tree};
+use super::opacity::{self, CULL_BACK, EYE_PASS, EYE_TEST, MIRRORED, SHADOW_PASS, SHADOW_TEST};
+use super::tree::Bounds;
 use super::triangle::{ShearedRay, TreeTriangle, TriangleHit};
 use super::wide::{Pending, SlabRay};
 use super::{Accel, Placed};
@@ -82,8 +82,7 @@ impl Accel {
         !self.with_pending(|pending| {
             self.upper.any(&slabs, t_max - start, pending, |slot, pending| {
                 let placed = &self.placed[slot];
-                let group = &self.groups[placed.group];
-                let tree = &self.trees[group.tree];
+                let (tree, instances) = self.lower(placed);
                 let (local, on) = placed.local(&ray, &tree.bounds);
                 let (slabs, sheared) = local.prepare();
                 let t_max = t_max - start - on;
@@ -91,7 +90,7 @@ impl Accel {
                     let triangle = &tree.triangles[i];
                     sheared
                         .intersect(triangle, local.t_min, t_max)
-                        .is_some_and(|hit| self.blocks(scene, &group.instances, triangle, &hit))
+                        .is_some_and(|hit| self.blocks(scene, instances, triangle, &hit))
                 })
             })
         })
@@ -122,8 +121,7 @@ impl Accel {
         nearest: &mut Nearest,
         pending: &mut [Pending],
     ) {
-        let group = &self.groups[placed.group];
-        let tree: &Tree = &self.trees[group.tree];
+        let (tree, instances) = self.lower(placed);
         let (local, on) = placed.local(ray, &tree.bounds);
         let (slabs, sheared) = local.prepare();
         let start = start + on;
@@ -132,18 +130,19 @@ impl Accel {
             let Some(mut hit) = sheared.intersect(triangle, local.t_min, t_max) else { return t_max };
             let t = hit.t;
             hit.t += start;
-            let instance = group.instances[triangle.part() as usize];
+            let instance = instances[triangle.part() as usize];
             let found = (instance, triangle.primitive());
             if hit.t >= nearest.hit.t && found >= (nearest.instance, nearest.primitive) {
                 return t_max;
             }
             let flags = triangle.flags();
+            hit.front ^= flags & MIRRORED != 0;
             let culled = sides == Sides::Visible && !hit.front && flags & CULL_BACK != 0;
             if culled || flags & EYE_PASS != 0 {
                 return t_max;
             }
             if flags & EYE_TEST != 0 {
-                let mesh = self.mesh(scene, &group.instances, triangle);
+                let mesh = self.mesh(scene, instances, triangle);
                 if !opacity::is_present_at(scene, mesh, triangle.primitive(), hit.u, hit.v) {
                     return t_max;
                 }

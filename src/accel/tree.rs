@@ -30,6 +30,22 @@ pub(super) struct Tree {
     pub bounds: Bounds,
 }
 
+/// A mesh in a tree.
+pub(super) struct Part<'a> {
+    pub mesh: usize,
+    /// In the tree's space.
+    pub positions: &'a [Vec3],
+    /// True if a mirroring transform has been applied to the positions.
+    pub mirrored: bool,
+}
+
+impl<'a> Part<'a> {
+    /// A mesh in its own space.
+    pub fn of(mesh: usize, positions: &'a [Vec3]) -> Self {
+        Self { mesh, positions, mirrored: false }
+    }
+}
+
 /// An axis-aligned box.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Bounds {
@@ -93,20 +109,20 @@ impl Bounds {
 }
 
 impl Tree {
-    /// The tree of `parts`: a mesh and its positions each. Triangles without area or with corners at infinity are
+    /// The tree of `parts`. Triangles without area or with corners at infinity are
     /// left out: no ray can meet them.
-    pub fn new<'a>(scene: &'a Scene, parts: impl Iterator<Item = (usize, &'a [Vec3])>) -> Self {
+    pub fn new<'a>(scene: &'a Scene, parts: impl Iterator<Item = Part<'a>>) -> Self {
         let mut triangles = Vec::new();
         let mut bounds = Bounds::default();
-        for (part, (mesh, positions)) in parts.enumerate() {
-            let mesh = &scene.meshes[mesh];
-            let flags = opacity::flags(scene, mesh);
+        for (number, part) in parts.enumerate() {
+            let mesh = &scene.meshes[part.mesh];
+            let flags = opacity::flags(scene, mesh) | if part.mirrored { opacity::MIRRORED } else { 0 };
             triangles.reserve(mesh.triangles.len());
             for (primitive, triangle) in mesh.triangles.iter().enumerate() {
-                let corners = triangle.map(|i| positions[i as usize]);
+                let corners = triangle.map(|i| part.positions[i as usize]);
                 if has_area(corners) {
                     corners.into_iter().for_each(|p| bounds.include(p));
-                    triangles.push(TreeTriangle::new(corners, primitive as u32, part as u32, flags));
+                    triangles.push(TreeTriangle::new(corners, primitive as u32, number as u32, flags));
                 }
             }
         }
@@ -133,7 +149,8 @@ pub(super) fn build(bounds: &[Bounds], reach: f32) -> (WideTree, Vec<u32>) {
     if bounds.is_empty() {
         return (WideTree::default(), Vec::new());
     }
-    let padded: Vec<Bounds> = bounds.iter().map(|b| b.padded(reach)).collect();
+    // A horizon far away should not fatten what is near the middle.
+    let padded: Vec<Bounds> = bounds.iter().map(|b| b.padded(b.reach().max(reach / 64.0))).collect();
     let boxes: Vec<Aabb> = padded.iter().map(|b| Aabb::new(b.min.into(), b.max.into())).collect();
     let indices = (0..boxes.len() as u32).collect();
     let mut builder = PlocBuilder::with_capacity(boxes.len());
