@@ -1,7 +1,7 @@
 //! Finding what a ray meets: a two-level bounding volume hierarchy over instances.
 //!
-//! The lower level has one tree for every set of meshes that share a transform: the materials of one glTF mesh are one
-//! tree, and instances of it share the tree. The upper level is a tree over the placed ones, in *render space*: world
+//! The lower level has one tree for all that stands still (see [`fused`]), and one for every set of meshes that share a
+//! transform: the materials of one glTF mesh are one tree, and instances of it share the tree. The upper level is a tree over the placed ones, in *render space*: world
 //! axes, metres, single precision, relative to an origin near the eye, so that a scene far from the
 //! world's origin keeps its precision. Both levels are `obvhs`'s eight-wide compressed trees.
 //!
@@ -10,21 +10,24 @@
 
 mod deform;
 mod displaced;
+mod fused;
 mod intersect;
 mod opacity;
 mod tree;
 mod triangle;
+mod wide;
 
 use crate::frame::SurfaceRef;
 use crate::scene::{Mesh, Pose, Scene};
 use deform::{Deformed, Shape, affine, is_deformable};
 pub use displaced::Displaced;
+use fused::Fused;
 use glam::{Affine3A, DAffine3, DVec3, Mat3A, Vec3, Vec3A, Vec4};
 pub use intersect::{RayHit, Sides};
-use obvhs::cwbvh::CwBvh;
 use rayon::prelude::*;
 use std::collections::HashMap;
-use tree::{Bounds, Tree, build_over};
+use tree::{Bounds, Part, Tree, build};
+use wide::WideTree;
 
 /// The scene as rays meet it. See the [module](self).
 pub struct Accel {
@@ -32,17 +35,20 @@ pub struct Accel {
     /// Lower trees: shared ones first, then one for each group that is deformed.
     trees: Vec<Tree>,
     groups: Vec<Group>,
+    /// What stands still, in one tree.
+    fused: Fused,
+    /// The groups that were fused, whether they are visible or not.
+    still: Vec<usize>,
     /// For each instance: its posed vertices, where it is deformed.
     deformed: Vec<Option<Box<Deformed>>>,
     /// For each instance: where it stands.
     placements: Vec<Placement>,
     /// What can be met, in the order of the upper tree.
     placed: Vec<Placed>,
-    upper: CwBvh,
+    upper: WideTree,
+    /// Entries that a ray may have pending at once in both levels.
+    pending: usize,
     bounds: Bounds,
-    /// Length of the unit in which rays are parametrised inside the trees: a power of two, so that it costs no
-    /// precision. `obvhs` takes any box that a ray leaves before t = 1e-4 for behind it, which must be short.
-    unit: f32,
 }
 
 /// Instances that share a transform and a tree.
@@ -56,9 +62,10 @@ struct Group {
     deformable: bool,
 }
 
-/// A group as the upper tree holds it.
+/// What the upper tree holds.
 struct Placed {
-    group: usize,
+    /// A group; none for the fused ones.
+    group: Option<usize>,
     object_from_render: Affine3A,
 }
 
@@ -72,12 +79,14 @@ pub(crate) struct Placement {
     pub winding: f32,
     /// Whether it can be met: visible and with a volume to stand in.
     pub present: bool,
+    /// The largest coordinate that a point of it has where rays meet it, if that is not in its own object's space.
+    pub fused_reach: f32,
 }
 
 impl Default for Placement {
     fn default() -> Self {
         let render_from_object = Affine3A::IDENTITY;
-        Self { render_from_object, normals: Mat3A::IDENTITY, winding: 1.0, present: false }
+        Self { render_from_object, normals: Mat3A::IDENTITY, winding: 1.0, present: false, fused_reach: 0.0 }
     }
 }
 
@@ -85,19 +94,27 @@ impl Accel {
     /// Builds the meshes' trees, in parallel, once for the scene. Nothing is met before [`Accel::place`].
     pub fn new(scene: &Scene) -> Self {
         let (groups, meshes) = group(scene);
-        let trees = meshes.par_iter().map(|meshes| {
-            Tree::new(scene, meshes.iter().map(|&m| (m, scene.meshes[m].positions.as_slice())))
+        let mut uses = vec![0; meshes.len()];
+        groups.iter().for_each(|g| uses[g.tree] += 1);
+        let fused = Fused::new(scene, &groups, &uses);
+        fused.groups().for_each(|g| uses[groups[g].tree] -= 1);
+        let trees = meshes.par_iter().zip(uses).map(|(meshes, uses)| {
+            // Trees that only fused groups would use are not needed.
+            let meshes = if uses > 0 { meshes.as_slice() } else { &[] };
+            Tree::new(scene, meshes.iter().map(|&m| Part::of(m, &scene.meshes[m].positions)))
         });
         Self {
             origin: DVec3::ZERO,
             trees: trees.collect(),
+            still: fused.groups().collect(),
+            fused,
             groups,
             deformed: scene.instances.iter().map(|_| None).collect(),
             placements: vec![Placement::default(); scene.instances.len()],
             placed: Vec::new(),
-            upper: CwBvh::default(),
+            upper: WideTree::default(),
+            pending: 0,
             bounds: Bounds::default(),
-            unit: 1.0,
         }
     }
 
@@ -108,10 +125,15 @@ impl Accel {
     pub fn place(&mut self, scene: &Scene, pose: &Pose, origin: DVec3) {
         self.origin = origin;
         let deformed = self.deform(scene, pose);
-        let mut moved = deformed;
+        let mut moved = self.fused.follow(scene, &self.groups, pose, &self.still) || deformed;
+        let mut reach = vec![0.0; scene.instances.len()];
+        for (&i, &r) in self.fused.instances.iter().zip(&self.fused.reach) {
+            reach[i as usize] = r;
+        }
         for group in &self.groups {
-            let placement = place_group(scene, group, pose, origin);
+            let mut placement = place_group(scene, group, pose, origin);
             for &instance in &group.instances {
+                placement.fused_reach = reach[instance as usize];
                 let old = &mut self.placements[instance as usize];
                 moved |= *old != placement;
                 *old = placement;
@@ -140,7 +162,7 @@ impl Accel {
                 let parts = group.instances.iter().map(|&i| {
                     let mesh = scene.instances[i as usize].mesh;
                     let posed = self.deformed[i as usize].as_ref();
-                    (mesh, posed.map_or(scene.meshes[mesh].positions.as_slice(), |d| &d.positions))
+                    Part::of(mesh, posed.map_or(scene.meshes[mesh].positions.as_slice(), |d| &d.positions))
                 });
                 self.trees[group.tree] = Tree::new(scene, parts);
                 changed = true;
@@ -155,7 +177,7 @@ impl Accel {
         for (number, group) in self.groups.iter().enumerate() {
             let tree = &self.trees[group.tree];
             let placement = group.instances.first().map(|&i| self.placements[i as usize]).unwrap_or_default();
-            if !placement.present || tree.bounds.is_empty() {
+            if !placement.present || tree.bounds.is_empty() || self.still.binary_search(&number).is_ok() {
                 continue;
             }
             let mut bound = Bounds::default();
@@ -163,20 +185,36 @@ impl Accel {
                 bound.include(placement.render_from_object.transform_point3(corner));
             }
             bounds.push(bound);
-            placed.push(Placed { group: number, object_from_render: placement.render_from_object.inverse() });
+            placed.push(Placed {
+                group: Some(number),
+                object_from_render: placement.render_from_object.inverse(),
+            });
+        }
+        if !self.fused.tree.bounds.is_empty() {
+            let anchor = (self.fused.anchor - self.origin).as_vec3();
+            let Bounds { min, max } = self.fused.tree.bounds;
+            bounds.push(Bounds { min: min + anchor, max: max + anchor });
+            placed.push(Placed { group: None, object_from_render: Affine3A::from_translation(-anchor) });
         }
         self.bounds = bounds.iter().fold(Bounds::default(), |mut all, b| {
             all.include(b.min);
             all.include(b.max);
             all
         });
-        self.upper = build_over(&bounds, &self.bounds);
+        let (upper, order) = build(&bounds, self.bounds.reach());
+        let lower = placed.iter().map(|p| self.lower(p).0.wide.pending()).max();
+        self.pending = upper.pending() + lower.unwrap_or(0);
+        self.upper = upper;
         let mut slots: Vec<Option<Placed>> = placed.into_iter().map(Some).collect();
-        self.placed = self.upper.primitive_indices.iter().filter_map(|&i| slots[i as usize].take()).collect();
-        let size = (self.bounds.max - self.bounds.min).max_element();
-        // A scene is 2^13 to 2^14 units across; the exponent alone, so a power of two.
-        let size = if size > 0.0 { size.clamp(1e-20, 1e20) } else { 1.0 };
-        self.unit = f32::from_bits(size.to_bits() & 0x7f80_0000) / 8192.0;
+        self.placed = order.iter().filter_map(|&i| slots[i as usize].take()).collect();
+    }
+
+    /// The tree of what is placed, and the instances that are its parts.
+    fn lower(&self, placed: &Placed) -> (&Tree, &[u32]) {
+        match placed.group {
+            Some(group) => (&self.trees[self.groups[group].tree], &self.groups[group].instances),
+            None => (&self.fused.tree, &self.fused.instances),
+        }
     }
 
     /// World position of render space's origin.
@@ -204,8 +242,8 @@ impl Accel {
     pub fn memory_bytes(&self) -> u64 {
         let trees: usize = self.trees.iter().map(Tree::memory_bytes).sum();
         let deformed: usize = self.deformed.iter().flatten().map(|d| d.memory_bytes()).sum();
-        let upper = size_of_val(self.upper.nodes.as_slice()) + size_of_val(self.placed.as_slice());
-        (trees + deformed + upper) as u64
+        let upper = self.upper.memory_bytes() + size_of_val(self.placed.as_slice());
+        (trees + self.fused.tree.memory_bytes() + deformed + upper) as u64
     }
 
     /// Where instance number `instance` stands.
@@ -286,5 +324,6 @@ fn place_group(scene: &Scene, group: &Group, pose: &Pose, origin: DVec3) -> Plac
         normals: object_from_render.matrix3.transpose(),
         winding: if m.matrix3.determinant() < 0.0 { -1.0 } else { 1.0 },
         present: visible && regular,
+        fused_reach: 0.0,
     }
 }

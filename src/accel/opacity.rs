@@ -16,6 +16,8 @@ pub(super) const EYE_PASS: u32 = 4;
 pub(super) const SHADOW_TEST: u32 = 8;
 /// Light passes everywhere.
 pub(super) const SHADOW_PASS: u32 = 16;
+/// The corners are wound the other way, because a mirroring transform has been applied to them.
+pub(super) const MIRRORED: u32 = 32;
 
 /// Below this alpha a blended surface is not there.
 const MIN_ALPHA: f32 = 1.0 / 255.0;

@@ -2,12 +2,11 @@
 
 use super::opacity;
 use super::triangle::TreeTriangle;
+use super::wide::WideTree;
 use crate::scene::Scene;
-use glam::{Vec3, Vec3A};
-use obvhs::Boundable;
+use glam::Vec3;
 use obvhs::aabb::Aabb;
 use obvhs::bvh2::reinsertion::ReinsertionOptimizer;
-use obvhs::cwbvh::CwBvh;
 use obvhs::cwbvh::bvh2_to_cwbvh::bvh2_to_cwbvh;
 use obvhs::ploc::{PlocBuilder, PlocSearchDistance, SortPrecision};
 
@@ -25,10 +24,26 @@ const FAR: f32 = 4.0;
 /// A tree over triangles, which lie in its order.
 #[derive(Default)]
 pub(super) struct Tree {
-    pub bvh: CwBvh,
+    pub wide: WideTree,
     pub triangles: Vec<TreeTriangle>,
     /// What the triangles span; minimum above maximum where there are none.
     pub bounds: Bounds,
+}
+
+/// A mesh in a tree.
+pub(super) struct Part<'a> {
+    pub mesh: usize,
+    /// In the tree's space.
+    pub positions: &'a [Vec3],
+    /// True if a mirroring transform has been applied to the positions.
+    pub mirrored: bool,
+}
+
+impl<'a> Part<'a> {
+    /// A mesh in its own space.
+    pub fn of(mesh: usize, positions: &'a [Vec3]) -> Self {
+        Self { mesh, positions, mirrored: false }
+    }
 }
 
 /// An axis-aligned box.
@@ -82,68 +97,69 @@ impl Bounds {
         if start.is_finite() { start } else { 0.0 }
     }
 
-    fn padded(&self, reach: f32) -> Aabb {
-        let padding = Vec3A::splat(reach * PADDING);
-        Aabb::new(Vec3A::from(self.min) - padding, Vec3A::from(self.max) + padding)
+    pub fn join(&mut self, other: &Self) {
+        (self.min, self.max) = (self.min.min(other.min), self.max.max(other.max));
+    }
+
+    /// Larger on all sides by the padding of a tree that reaches so far.
+    fn padded(self, reach: f32) -> Self {
+        let padding = Vec3::splat(reach * PADDING);
+        Self { min: self.min - padding, max: self.max + padding }
     }
 }
 
 impl Tree {
-    /// The tree of `parts`: a mesh and its positions each. Triangles without area or with corners at infinity are
+    /// The tree of `parts`. Triangles without area or with corners at infinity are
     /// left out: no ray can meet them.
-    pub fn new<'a>(scene: &'a Scene, parts: impl Iterator<Item = (usize, &'a [Vec3])>) -> Self {
+    pub fn new<'a>(scene: &'a Scene, parts: impl Iterator<Item = Part<'a>>) -> Self {
         let mut triangles = Vec::new();
         let mut bounds = Bounds::default();
-        for (part, (mesh, positions)) in parts.enumerate() {
-            let mesh = &scene.meshes[mesh];
-            let flags = opacity::flags(scene, mesh);
+        for (number, part) in parts.enumerate() {
+            let mesh = &scene.meshes[part.mesh];
+            let flags = opacity::flags(scene, mesh) | if part.mirrored { opacity::MIRRORED } else { 0 };
             triangles.reserve(mesh.triangles.len());
             for (primitive, triangle) in mesh.triangles.iter().enumerate() {
-                let corners = triangle.map(|i| positions[i as usize]);
+                let corners = triangle.map(|i| part.positions[i as usize]);
                 if has_area(corners) {
                     corners.into_iter().for_each(|p| bounds.include(p));
-                    triangles.push(TreeTriangle::new(corners, primitive as u32, part as u32, flags));
+                    triangles.push(TreeTriangle::new(corners, primitive as u32, number as u32, flags));
                 }
             }
         }
-        let reach = bounds.reach();
-        let boxes: Vec<Aabb> = triangles
-            .iter()
-            .map(|t| {
-                let mut bounds = Bounds::default();
-                t.corners().into_iter().for_each(|p| bounds.include(p));
-                bounds.padded(reach)
-            })
-            .collect();
-        let bvh = build(&boxes);
-        let triangles = bvh.primitive_indices.iter().map(|&i| triangles[i as usize]).collect();
-        Self { bvh, triangles, bounds }
+        let boxes = triangles.iter().map(|t| {
+            let mut bounds = Bounds::default();
+            t.corners().into_iter().for_each(|p| bounds.include(p));
+            bounds
+        });
+        let (wide, order) = build(&boxes.collect::<Vec<_>>(), bounds.reach());
+        let triangles = order.iter().map(|&i| triangles[i as usize]).collect();
+        Self { wide, triangles, bounds }
     }
 
     pub fn memory_bytes(&self) -> usize {
-        size_of_val(self.triangles.as_slice())
-            + size_of_val(self.bvh.nodes.as_slice())
-            + size_of_val(self.bvh.primitive_indices.as_slice())
+        size_of_val(self.triangles.as_slice()) + self.wide.memory_bytes()
     }
 }
 
-/// A tree over boxes that together span `all`.
-pub(super) fn build_over(bounds: &[Bounds], all: &Bounds) -> CwBvh {
-    let boxes: Vec<Aabb> = bounds.iter().map(|b| b.padded(all.reach())).collect();
-    build(&boxes)
-}
-
-/// An eight-wide tree. The parameters are `BvhBuildParams::medium_build`'s, which build a quarter of a million
-/// triangles in about a fifth of a second; the slower presets traced no more than a few per cent faster.
-fn build<T: Boundable>(boxes: &[T]) -> CwBvh {
-    if boxes.is_empty() {
-        return CwBvh::default();
+/// An eight-wide tree over boxes that lie within `reach` of the origin, and their order in it.
+///
+/// The parameters are `BvhBuildParams::medium_build`'s, which build a quarter of a million triangles in a tenth of a
+/// second. Slower presets, splitting long triangles included, traced no faster than the noise of the measurement.
+pub(super) fn build(bounds: &[Bounds], reach: f32) -> (WideTree, Vec<u32>) {
+    if bounds.is_empty() {
+        return (WideTree::default(), Vec::new());
     }
+    // A horizon far away should not fatten what is near the middle.
+    let padded: Vec<Bounds> = bounds.iter().map(|b| b.padded(b.reach().max(reach / 64.0))).collect();
+    let boxes: Vec<Aabb> = padded.iter().map(|b| Aabb::new(b.min.into(), b.max.into())).collect();
     let indices = (0..boxes.len() as u32).collect();
     let mut builder = PlocBuilder::with_capacity(boxes.len());
-    let mut bvh2 = builder.build(PlocSearchDistance::Medium, boxes, indices, SortPrecision::U64, 3);
+    let mut bvh2 = builder.build(PlocSearchDistance::Medium, &boxes, indices, SortPrecision::U64, 3);
     ReinsertionOptimizer::default().run(&mut bvh2, 0.05, None);
-    bvh2_to_cwbvh(&bvh2, 3, true, false)
+    let bvh = bvh2_to_cwbvh(&bvh2, 3, true, false);
+    let order = bvh.primitive_indices.clone();
+    let ordered: Vec<Bounds> = order.iter().map(|&i| padded[i as usize]).collect();
+    (WideTree::new(&bvh, &ordered), order)
 }
 
 fn has_area([a, b, c]: [Vec3; 3]) -> bool {

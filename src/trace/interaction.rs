@@ -94,7 +94,8 @@ impl<'a> SurfaceInteraction<'a> {
         let magnitude = m.matrix3.abs()
             * (a.abs() * weights[0] + b.abs() * weights[1] + c.abs() * weights[2])
             + m.translation.abs();
-        let offset = magnitude.max_element() * (OFFSET_ROUNDINGS * f32::EPSILON * 0.5);
+        let offset =
+            (magnitude.max_element() + placement.fused_reach) * (OFFSET_ROUNDINGS * f32::EPSILON * 0.5);
 
         // Seen at a slant, the footprint is an ellipse; a square of the same area stands for it.
         let slant = geometric.dot(view).abs().max(0.05);

@@ -24,8 +24,12 @@ fn a_mirrored_instance_keeps_its_front() {
         add_plane(&mut scene, matt(Vec3::ONE), 10.0, DAffine3::from_scale(scale));
         scene.add_camera(DVec3::new(0.0, 4.0, 0.0), DVec3::ZERO, 0.8);
         add_sun(&mut scene);
-        let pixel = Rig::new(scene).center();
+        // Alone, and as part of one tree of all that stands still.
+        let pixel = Rig::new(scene.clone()).center();
         assert_eq!((pixel.sample.normal.get(), pixel.lit), (Vec3::Y, vec![1]), "{scale}");
+        add_plane(&mut scene, matt(Vec3::ONE), 5.0, at(0.0, -1.0, 0.0));
+        let pixel = Rig::new(scene).center();
+        assert_eq!((pixel.sample.object, pixel.sample.normal.get(), pixel.lit), (1, Vec3::Y, vec![1]));
     }
 }
 

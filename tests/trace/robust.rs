@@ -270,6 +270,28 @@ fn moved_hidden_and_deformed_instances_are_met_where_they_are() {
     assert_eq!(height(&mut accel, &pose, DVec3::ZERO, 0.2), None);
 }
 
+#[test]
+fn what_was_thought_to_stand_still_is_met_where_a_pose_puts_it() {
+    let mut scene = Scene::default();
+    for x in [0.0, 5.0, 10.0] {
+        add_plane(&mut scene, matt(Vec3::ONE), 1.0, at(x, 0.0, 0.0));
+    }
+    let mut pose = scene.pose(0.0);
+    let mut accel = Accel::new(&scene);
+    let height = |accel: &mut Accel, pose: &Pose, x: f32| {
+        accel.place(&scene, pose, DVec3::ZERO);
+        let hit = accel.intersect(&scene, Vec3::new(x, 9.0, 0.3), Vec3::NEG_Y, 0.0, 99.0, Sides::Visible)?;
+        Some((accel.surface_point(&scene, hit.surface).y, 9.0 - hit.t))
+    };
+    assert_eq!(height(&mut accel, &pose, 5.2), Some((0.0, 0.0)));
+    pose.world_from_node[1] = at(5.0, 2.0, 0.0);
+    assert_eq!(height(&mut accel, &pose, 5.2), Some((2.0, 2.0)));
+    assert_eq!(height(&mut accel, &pose, 9.8), Some((0.0, 0.0)));
+    pose.visible[1] = false;
+    assert_eq!(height(&mut accel, &pose, 5.2), None);
+    assert_eq!(height(&mut accel, &pose, 0.2), Some((0.0, 0.0)));
+}
+
 /// Möller-Trumbore in double precision.
 fn brute_force(mesh: &Mesh, world_from_object: DAffine3, eye: DVec3, direction: DVec3) -> Option<f64> {
     let meet = |triangle: &[u32; 3]| {
