@@ -15,7 +15,7 @@ from mathutils import Matrix
 
 from ..common.document import Document
 from ..common.extras import tidy
-from ..common.motion import Animation
+from ..common.motion import Animation, unscaled
 from ..common.report import Lost
 
 # Blender is Z-up, glTF Y-up; cameras and lights look along -Z in both.
@@ -24,14 +24,7 @@ YUP = np.array(Matrix.Rotation(-math.pi / 2, 4, "X"))
 
 def view_matrix(world: Matrix) -> np.ndarray:
     """World matrix of a camera or light in glTF axes, scale and shear taken off (Blender's renderer does the same)."""
-    m = YUP @ np.array(world)
-    back = m[:3, 2] / max(np.linalg.norm(m[:3, 2]), 1e-30)
-    up = m[:3, 1] - back * np.dot(back, m[:3, 1])
-    up /= max(np.linalg.norm(up), 1e-30)
-    out = np.eye(4)
-    out[:3, :3] = np.stack([np.cross(up, back), up, back], axis=1)
-    out[:3, 3] = m[:3, 3]
-    return out
+    return unscaled(YUP @ np.array(world))
 
 
 @dataclass

@@ -101,5 +101,9 @@ if __name__ == "__main__":
         code = 1
     sys.stdout.flush()
     sys.stderr.flush()
+    import bpy
+
     # Blender ignores sys.exit() codes of scripts unless told so, and its shutdown can crash in background mode.
-    os._exit(code)
+    # With its window open, Blender stays.
+    if bpy.app.background:
+        os._exit(code)

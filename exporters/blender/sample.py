@@ -96,6 +96,9 @@ class Sampler:
         self.geometry.begin_sample()
         for key, instance, visible in self._walk(depsgraph):
             ob = instance.object
+            if not np.isfinite(np.array(instance.matrix_world)).all():
+                self.lost.add(ob.name, "transform that is not a number", "it is hidden while that lasts; check its constraints and drivers")
+                continue
             if ob.type == "LIGHT":
                 track = self.lights.get(key)
                 if track is None:

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from . import VERSION
-from .report import ExportError, Lost
+from .report import ExportError, InputError, Lost
 
 LUMENS_PER_WATT = 683.0
 _SCHEMA = Path(__file__).resolve().parents[2] / "docs" / "extras.schema.json"
@@ -84,10 +84,11 @@ def simplify_cuts(cuts: list[dict[str, Any]], frame_start: int, frame_end: int) 
 
 
 def check(root: dict[str, Any]) -> None:
-    """Validate all extras of a document against the schema; without the jsonschema package or the schema, do nothing.
+    """Refuse numbers that JSON cannot hold, and validate all extras against the schema.
 
-    Blender ships neither, and there the tests of this project stand in for the check.
+    Blender ships neither the jsonschema package nor the schema; there the tests of this project stand in for that part.
     """
+    _refuse_infinite(root, "")
     try:
         import jsonschema
     except ImportError:
@@ -100,6 +101,17 @@ def check(root: dict[str, Any]) -> None:
         for error in validator.iter_errors(value):
             where = "/".join([pointer, *map(str, error.absolute_path)])
             raise ExportError(f"{where}: {error.message}; this is a bug in the exporter, please report it")
+
+
+def _refuse_infinite(value: Any, pointer: str) -> None:
+    if isinstance(value, dict):
+        for key, item in value.items():
+            _refuse_infinite(item, f"{pointer}/{key}")
+    elif isinstance(value, list):
+        for i, item in enumerate(value):
+            _refuse_infinite(item, f"{pointer}/{i}")
+    elif isinstance(value, float) and not math.isfinite(value):
+        raise InputError(f"{pointer}: {value} is no number that glTF can hold; look for an endless or broken value in the scene")
 
 
 def _described(root: dict[str, Any]) -> list[tuple[str, str, Any]]:

@@ -120,6 +120,26 @@ def split_sheared(matrices: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return upper, lower
 
 
+def unscaled(world: np.ndarray) -> np.ndarray:
+    """A matrix without scale and shear, for cameras and lights: -Z keeps its direction exactly, +Y its side.
+
+    What renderers do: position and direction count. A matrix that is flat in a needed direction keeps the axis it had.
+    """
+    out = np.eye(4)
+    out[:3, 3] = world[:3, 3]
+    length = np.linalg.norm(world[:3, 2])
+    back = world[:3, 2] / length if length > 1e-20 else np.array([0.0, 0.0, 1.0])
+    up = world[:3, 1] - back * np.dot(back, world[:3, 1])
+    length = np.linalg.norm(up)
+    if length < 1e-20:
+        other = np.eye(3)[int(np.argmin(np.abs(back)))]
+        up = other - back * np.dot(back, other)
+        length = np.linalg.norm(up)
+    up = up / length
+    out[:3, :3] = np.stack([np.cross(up, back), up, back], axis=1)
+    return out
+
+
 class Animation:
     """The one animation of an exported file: everything in it plays together."""
 

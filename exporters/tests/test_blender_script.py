@@ -46,6 +46,21 @@ def test_glb_is_one_file(blend, tmp_path):
     assert [p.name for p in (tmp_path / "glb").iterdir()] == ["anim.glb"]
 
 
+def test_as_blender_runs_it(blend, tmp_path):
+    """`blender -b file -P export.py -- out.gltf`: the file is open, and only what follows `--` is ours."""
+    target = tmp_path / "inside" / "anim.gltf"
+    code = f"""
+import bpy, runpy, sys
+bpy.ops.wm.open_mainfile(filepath={str(blend)!r})
+bpy.app.binary_path = "/usr/bin/blender"
+sys.argv = ["blender", "-b", {str(blend)!r}, "-P", {str(SCRIPT)!r}, "--", {str(target)!r}, "--resolution", "10x6"]
+runpy.run_path({str(SCRIPT)!r}, run_name="__main__")
+"""
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=120, check=False)
+    assert done.returncode == 0, done.stderr
+    assert json.loads(target.read_text())["scenes"][0]["extras"]["buzz"]["resolution"] == [10, 6]
+
+
 @pytest.mark.parametrize(
     ("make", "arguments", "code", "words"),
     [

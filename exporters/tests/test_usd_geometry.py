@@ -459,3 +459,29 @@ def test_display_colour_read_by_a_material(usd_convert):
     gltf = usd_convert(made)
     assert len(np.unique(primitive(gltf, "Card")[1]["COLOR_0"], axis=0)) == 4
     assert "COLOR_0" not in primitive(gltf, "Plain")[1], "display colours do not tint a material that does not read them"
+
+
+def test_broken_transforms_are_hidden_and_named(usd_convert):
+    made = u.stage()
+    camera = u.camera(made)
+    UsdGeom.XformCommonAPI(camera).SetScale((0, 0, 0))
+    prim = u.quad(made, "/World/Broken")
+    UsdGeom.Xformable(prim).AddTransformOp().Set(Gf.Matrix4d(float("nan")))
+    flat = u.quad(made, "/World/Flat")
+    UsdGeom.XformCommonAPI(flat).SetScale((1, 0, 1))
+    gltf = usd_convert(made)
+    assert all(n["name"] != "Broken" for n in gltf.root["nodes"])
+    assert gltf.lost_features("/World/Broken") == ["transform that is not a number"]
+    assert np.isfinite(gltf.world(gltf.node("Flat"), 1)).all()
+    assert np.isfinite(gltf.world(gltf.node("Camera"), 1)).all()
+
+
+def test_endless_numbers_are_one_clear_error(usd_convert):
+    from exporters.common.report import InputError
+    from pxr import UsdLux
+
+    made = u.stage()
+    u.camera(made)
+    UsdLux.SphereLight.Define(made, "/World/Light").CreateIntensityAttr(float("inf"))
+    with pytest.raises(InputError, match="lights/0"):
+        usd_convert(made)

@@ -11,9 +11,8 @@ from pxr import Gf, Usd, UsdGeom
 
 from ..common.document import Document
 from ..common.extras import tidy
-from ..common.motion import Animation
+from ..common.motion import Animation, unscaled
 from ..common.report import Lost
-from .lights import unscaled
 
 
 @dataclass

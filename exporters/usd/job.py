@@ -242,6 +242,9 @@ class _Conversion:
         for found in self.walker.at(time):
             seen.add(found.key)
             world = self.root @ found.matrix
+            if not np.isfinite(world).all():
+                self.lost.add(str(found.prim.GetPath()), "transform that is not a number", "it is hidden while that lasts; check its xformOps")
+                found.visible, world = False, self.root
             if found.kind == "camera":
                 track = self.cameras.setdefault(found.key, CameraTrack(found.prim))
                 track.sample(time, world, self.units, aspect, self.policy)

@@ -16,7 +16,7 @@ from pxr import Usd, UsdGeom, UsdLux
 
 from ..common.document import Document, write_whole
 from ..common.extras import LUMENS_PER_WATT, tidy
-from ..common.motion import Animation
+from ..common.motion import Animation, unscaled
 from ..common.report import Lost
 from .textures import open_asset, resolved_path
 
@@ -103,17 +103,6 @@ class LightTrack:
                 animation.pointer(f"{pointer}/extras/{key}", values[key])
         if "width" in first:
             animation.pointer(f"{pointer}/extras/area/size", np.stack([values["width"], values["height"]], axis=1))
-
-
-def unscaled(world: np.ndarray) -> np.ndarray:
-    """A matrix without scale and shear; -Z keeps its direction exactly."""
-    back = world[:3, 2] / max(np.linalg.norm(world[:3, 2]), 1e-30)
-    up = world[:3, 1] - back * np.dot(back, world[:3, 1])
-    up /= max(np.linalg.norm(up), 1e-30)
-    out = np.eye(4)
-    out[:3, :3] = np.stack([np.cross(up, back), up, back], axis=1)
-    out[:3, 3] = world[:3, 3]
-    return out
 
 
 def _get(prim: Usd.Prim, name: str, time: Usd.TimeCode, default: Any) -> Any:
