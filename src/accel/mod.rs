@@ -1,9 +1,10 @@
 //! Finding what a ray meets: a two-level bounding volume hierarchy over instances.
 //!
-//! The lower level has one tree for all that stands still (see [`fused`]), and one for every set of meshes that share a
-//! transform: the materials of one glTF mesh are one tree, and instances of it share the tree. The upper level is a tree over the placed ones, in *render space*: world
-//! axes, metres, single precision, relative to an origin near the eye, so that a scene far from the
-//! world's origin keeps its precision. Both levels are `obvhs`'s eight-wide compressed trees.
+//! The lower level has one tree for all that stands still, and one for every other set of meshes that share a
+//! transform: the materials of one glTF mesh are one tree, and instances of it share the tree. The upper level is a
+//! tree over the placed ones, in *render space*: world axes, metres, single precision, relative to an origin near the
+//! eye, so that a scene far from the world's origin keeps its precision. `obvhs` builds both levels; rays walk them in
+//! a form of their own.
 //!
 //! Static scenes build their lower trees once; [`Accel::place`] then costs one small tree over the instances, and nothing
 //! at all when neither the origin nor an instance has moved.

@@ -2,8 +2,8 @@
 //!
 //! `obvhs` builds the tree and decides which nodes are joined to eight. Its compressed nodes are made for GPUs: on plain
 //! x86-64, without the instructions that widen bytes, unpacking them took most of a ray's time, and they are
-//! visited in the order of the ray's octant rather than of distance. These nodes are 2.8 times as large and
-//! met a ray in about half the time.
+//! visited in the order of the ray's octant rather than of distance. These nodes are 2.8 times as large, and
+//! a ray through them takes about a third less time (59 thousand triangles, seven lights).
 
 use super::tree::Bounds;
 use glam::{Vec3, Vec4};

@@ -202,7 +202,7 @@ impl<'a> Tracer<'a> {
             return Vec3::ZERO;
         };
         let surface = Surface::new(&it);
-        finite(surface.albedo * arriving.irradiance * FRAC_1_PI * surface.coverage)
+        finite(surface.albedo * arriving.irradiance * FRAC_1_PI * self.coverage(&surface, 0))
     }
 
     /// True if something stands between the eye and a sample, nearer by more than a thousandth of its distance; for

@@ -13,8 +13,8 @@ use std::f32::consts::FRAC_1_PI;
 /// A ray is followed only if it carries more than this share of what it finds to the pixel.
 const MIN_SHARE: f32 = 1.0 / 256.0;
 
-/// A highlight is left out where its lobe has less density than this: with any Fresnel term and cosine it adds less
-/// than 1e-4 of what a white diffuse surface would.
+/// A highlight is left out where its lobe has less density than this, 1/sr: but for grazing angles it would add less
+/// than 1e-4 of what a white diffuse surface does.
 const MIN_LOBE: f32 = 1e-4;
 
 /// How a point came to be looked at.
@@ -86,9 +86,7 @@ impl Tracer<'_> {
         path: &Path,
         rays: &mut RayCounts,
     ) -> Radiance {
-        let deepest = path.bounces >= self.options.bounces;
-        // Where a blended surface is the last thing that may be met, it hides what is behind.
-        let coverage = if deepest { 1.0 } else { surface.coverage };
+        let coverage = self.coverage(surface, path.bounces);
         let mut specular = highlights;
         if surface.f90 > 0.0 || surface.eta.is_some() {
             specular += self.mirrored(it, surface, toward, coverage, path, rays);
@@ -108,6 +106,12 @@ impl Tracer<'_> {
             emission: surface.emission * coverage,
             alpha: 1.0,
         }
+    }
+
+    /// How much of what is behind a surface it hides, after so many bounces. Where a blended surface is the last
+    /// thing that may be met, it hides all.
+    pub(super) fn coverage(&self, surface: &Surface, bounces: u32) -> f32 {
+        if bounces >= self.options.bounces { 1.0 } else { surface.coverage }
     }
 
     /// What the surface mirrors of other things: sharp where smooth, the world's blurred light where rough.
