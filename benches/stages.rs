@@ -3,6 +3,8 @@
 //!
 //! `cargo bench` prints milliseconds a frame; `docs/performance.md` says what they mean.
 
+#![allow(clippy::expect_used)] // A bench that cannot run has nothing better to do.
+
 use buzz::accel::Accel;
 use buzz::frame::{Aov, AovSet, Frame, PixelClass, RayCounts, SurfaceSample};
 use buzz::import::{ImportOptions, import};

@@ -1,5 +1,7 @@
 //! The command line: arguments as typed, the job as meant, progress, messages. Only here is anything printed.
 
+#![allow(clippy::print_stdout, clippy::print_stderr)]
+
 mod args;
 mod compare;
 mod convert;
