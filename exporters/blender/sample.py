@@ -96,8 +96,8 @@ class Sampler:
         self.geometry.begin_sample()
         for key, instance, visible in self._walk(depsgraph):
             ob = instance.object
-            if not np.isfinite(np.array(instance.matrix_world)).all():
-                self.lost.add(ob.name, "transform that is not a number", "it is hidden while that lasts; check its constraints and drivers")
+            if not (np.abs(np.array(instance.matrix_world)) < 1e15).all():
+                self.lost.add(ob.name, "transform that is no usable number", "it is hidden while that lasts; check its constraints and drivers")
                 continue
             if ob.type == "LIGHT":
                 track = self.lights.get(key)

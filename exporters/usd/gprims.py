@@ -36,8 +36,12 @@ def is_gprim(prim: Usd.Prim) -> bool:
     return prim.GetTypeName() in ("Sphere", "Cube", "Cylinder", "Cylinder_1", "Cone", "Capsule", "Capsule_1", "Plane")
 
 
-def read_gprim(prim: Usd.Prim, time: Usd.TimeCode) -> Shape:
-    """The shape of a gprim at one time."""
+def read_gprim(prim: Usd.Prim, time: Usd.TimeCode) -> Shape | None:
+    """The shape of a gprim at one time; None if a size of it is no number."""
+    for name in ("radius", "radiusTop", "radiusBottom", "size", "height", "width", "length"):
+        value = prim.GetAttribute(name).Get(time) if prim.HasAttribute(name) else 0.0
+        if not isinstance(value, (int, float)) or not 0 <= value < 1e15:
+            return None
     kind = prim.GetTypeName().removesuffix("_1")
 
     def get(name: str, fallback: float) -> float:

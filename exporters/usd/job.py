@@ -26,6 +26,7 @@ from .textures import Textures
 from .walk import Found, Walker
 
 _DEFAULT_WIDTH = 1280
+_LONGEST = 100_000
 # Where the light comes from in a stage without a camera: above and behind the one who looks along -Z.
 _DOWNWARDS = np.array([[[0.8, -0.35, 0.49, 0], [0, 0.81, 0.58, 0], [-0.6, -0.47, 0.65, 0], [0, 0, 0, 1]]])
 
@@ -67,7 +68,12 @@ def convert(source: Path, target: Path, options: Options) -> Result:
     target = Path(target).resolve()
     if target.suffix not in (".gltf", ".glb"):
         raise OutputError(f"{target}: the name must end in .gltf or .glb")
-    return _Conversion(source, target, options).run()
+    try:
+        return _Conversion(source, target, options).run()
+    except Tf.ErrorException as error:
+        # What USD itself refuses, such as an xformOp that does not exist; its text ends with the reason in quotes.
+        reason = " ".join(str(error).split()).rsplit(" : ", 1)[-1].strip("'")
+        raise InputError(f"{source}: {reason}; check the stage with usdchecker") from None
 
 
 def open_stage(source: Path, variants: list[tuple[str, str, str]], lost: Lost) -> Usd.Stage:
@@ -114,6 +120,8 @@ class _Conversion:
         self.stage = open_stage(self.source, options.variants, self.lost)
         self.up = UsdGeom.GetStageUpAxis(self.stage)
         self.units = UsdGeom.GetStageMetersPerUnit(self.stage)
+        if not (0 < self.units < 1e9):
+            raise InputError(f"{source}: metersPerUnit is {self.units}; it must be a number over 0")
         self.root = np.eye(4)
         self.root[:3, :3] *= self.units
         if self.up == UsdGeom.Tokens.z:
@@ -125,6 +133,8 @@ class _Conversion:
         self.frames = options.frames or self._range()
         if self.frames[1] < self.frames[0]:
             raise InputError(f"frame range {self.frames[0]}-{self.frames[1]}: the last frame is before the first")
+        if self.frames[1] - self.frames[0] > _LONGEST:
+            raise InputError(f"frame range {self.frames[0]}-{self.frames[1]}: longer than {_LONGEST} frames; pass --frames FIRST-LAST")
         self.tracks: dict[tuple, Track] = {}
         self.cameras: dict[tuple, CameraTrack] = {}
         self.lights: dict[tuple, LightTrack] = {}
@@ -171,9 +181,11 @@ class _Conversion:
                 self.lost.add(str(root.GetPath()), "skinning", "UsdSkel could not bake it; it stands in its rest pose")
 
     def _range(self) -> tuple[int, int]:
-        if self.stage.HasAuthoredTimeCodeRange():
-            return math.floor(self.stage.GetStartTimeCode()), math.ceil(self.stage.GetEndTimeCode())
-        times = {t for prim in Usd.PrimRange.Stage(self.stage) for a in prim.GetAuthoredAttributes() for t in a.GetTimeSamples()}
+        times = [self.stage.GetStartTimeCode(), self.stage.GetEndTimeCode()]
+        if not self.stage.HasAuthoredTimeCodeRange():
+            times = [t for prim in Usd.PrimRange.Stage(self.stage) for a in prim.GetAuthoredAttributes() for t in a.GetTimeSamples()]
+        if not all(math.isfinite(t) for t in times):
+            raise InputError(f"{self.source}: its time codes are no numbers; pass --frames FIRST-LAST")
         return (math.floor(min(times)), math.ceil(max(times))) if times else (0, 0)
 
     def run(self) -> Result:
@@ -242,8 +254,8 @@ class _Conversion:
         for found in self.walker.at(time):
             seen.add(found.key)
             world = self.root @ found.matrix
-            if not np.isfinite(world).all():
-                self.lost.add(str(found.prim.GetPath()), "transform that is not a number", "it is hidden while that lasts; check its xformOps")
+            if not (np.abs(world) < 1e15).all():
+                self.lost.add(str(found.prim.GetPath()), "transform that is no usable number", "it is hidden while that lasts; check its xformOps")
                 found.visible, world = False, self.root
             if found.kind == "camera":
                 track = self.cameras.setdefault(found.key, CameraTrack(found.prim))

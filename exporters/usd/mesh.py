@@ -48,6 +48,14 @@ def add_pose(primitives: list[Primitive], prim: Usd.Prim, time: Usd.TimeCode, le
     return True
 
 
+def _array(attribute: Usd.Attribute, time: Usd.TimeCode, dtype: type) -> np.ndarray:
+    """An attribute's values; empty where it has none or values of a wrong type (a mistyped layer)."""
+    try:
+        return np.array(attribute.Get(time) or [], dtype=dtype)
+    except (TypeError, ValueError):
+        return np.empty(0, dtype=dtype)
+
+
 def may_deform(prim: Usd.Prim) -> bool:
     """Whether the points of a mesh move against it."""
     mesh = UsdGeom.Mesh(prim)
@@ -57,9 +65,9 @@ def may_deform(prim: Usd.Prim) -> bool:
 def _polygons(mesh: UsdGeom.Mesh, time: Usd.TimeCode, levels: int, lost: Lost) -> tuple[Polygons | None, bool]:
     """The mesh with all primvars at corners, subdivided; and whether it has normals."""
     path = str(mesh.GetPath())
-    points = np.array(mesh.GetPointsAttr().Get(time) or [], dtype=float).reshape(-1, 3)
-    counts = np.array(mesh.GetFaceVertexCountsAttr().Get(time) or [], dtype=int)
-    corners = np.array(mesh.GetFaceVertexIndicesAttr().Get(time) or [], dtype=int)
+    points = _array(mesh.GetPointsAttr(), time, float).reshape(-1, 3)
+    counts = _array(mesh.GetFaceVertexCountsAttr(), time, int)
+    corners = _array(mesh.GetFaceVertexIndicesAttr(), time, int)
     if not len(points) or not len(counts):
         lost.add(path, "mesh without faces", "it is left out")
         return None, False
@@ -85,7 +93,7 @@ def _polygons(mesh: UsdGeom.Mesh, time: Usd.TimeCode, levels: int, lost: Lost) -
             lost.add(path, f"subdivision beyond level {level}", "it would make more than four million faces; simplify the cage")
             break
         out = catmull_clark(out, corners_sharp=rule != UsdGeom.Tokens.edgeOnly)
-    holes = np.array(mesh.GetHoleIndicesAttr().Get(time) or [], dtype=int)
+    holes = _array(mesh.GetHoleIndicesAttr(), time, int)
     good = ~np.isin(out.parents, holes) & (out.counts >= 3)
     if not good.all():
         out = _keep(out, good)
@@ -101,9 +109,9 @@ def _polygons(mesh: UsdGeom.Mesh, time: Usd.TimeCode, levels: int, lost: Lost) -
 
 
 def _creases(mesh: UsdGeom.Mesh, time: Usd.TimeCode, out: Polygons) -> None:
-    lengths = np.array(mesh.GetCreaseLengthsAttr().Get(time) or [], dtype=int)
-    indices = np.array(mesh.GetCreaseIndicesAttr().Get(time) or [], dtype=int)
-    sharp = np.array(mesh.GetCreaseSharpnessesAttr().Get(time) or [], dtype=float)
+    lengths = _array(mesh.GetCreaseLengthsAttr(), time, int)
+    indices = _array(mesh.GetCreaseIndicesAttr(), time, int)
+    sharp = _array(mesh.GetCreaseSharpnessesAttr(), time, float)
     edges, values, at, used = [], [], 0, 0
     for length in lengths:
         for k in range(length - 1):
@@ -117,8 +125,8 @@ def _creases(mesh: UsdGeom.Mesh, time: Usd.TimeCode, out: Polygons) -> None:
     if edges:
         out.edges, out.sharpness = np.array(edges), np.minimum(np.array(values), INFINITE)
     out.point_sharpness = np.zeros(len(out.points))
-    corners = np.array(mesh.GetCornerIndicesAttr().Get(time) or [], dtype=int)
-    weights = np.array(mesh.GetCornerSharpnessesAttr().Get(time) or [], dtype=float)
+    corners = _array(mesh.GetCornerIndicesAttr(), time, int)
+    weights = _array(mesh.GetCornerSharpnessesAttr(), time, float)
     n = min(len(corners), len(weights))
     valid = corners[:n] < len(out.points)
     out.point_sharpness[corners[:n][valid]] = np.minimum(weights[:n][valid], INFINITE)
@@ -151,7 +159,7 @@ def _primvars(mesh: UsdGeom.Mesh, time: Usd.TimeCode, out: Polygons, lost: Lost)
     if normals and normals.HasValue():
         values = _at_corners(normals, time, out, 3, str(mesh.GetPath()), lost)
     elif mesh.GetNormalsAttr().HasAuthoredValue():
-        data = np.array(mesh.GetNormalsAttr().Get(time) or [], dtype=float).reshape(-1, 3)
+        data = _array(mesh.GetNormalsAttr(), time, float).reshape(-1, 3)
         values = _spread(data, mesh.GetNormalsInterpolation(), out, str(mesh.GetPath()), "normals", lost)
     if values is not None:
         length = np.linalg.norm(values, axis=1, keepdims=True)
@@ -161,9 +169,12 @@ def _primvars(mesh: UsdGeom.Mesh, time: Usd.TimeCode, out: Polygons, lost: Lost)
 def _at_corners(primvar: UsdGeom.Primvar, time: Usd.TimeCode, out: Polygons, width: int, path: str, lost: Lost) -> np.ndarray | None:
     """A primvar's values at every corner, indices resolved; None if it has none or they do not fit."""
     data = primvar.ComputeFlattened(time) if primvar.IsIndexed() else primvar.Get(time)
-    if data is None:
+    try:
+        values = np.array(data, dtype=float).reshape(-1, width) if data is not None else None
+    except (TypeError, ValueError):
+        values = None
+    if values is None or not np.isfinite(values).all():
         return None
-    values = np.array(data, dtype=float).reshape(-1, width)
     return _spread(values, primvar.GetInterpolation(), out, path, f"primvar {primvar.GetPrimvarName()}", lost)
 
 
@@ -202,7 +213,7 @@ def _subsets(mesh: UsdGeom.Mesh, polygons: Polygons, time: Usd.TimeCode, lost: L
     rest = np.ones(len(polygons.counts), dtype=bool)
     found = []
     for subset in UsdShade.MaterialBindingAPI(mesh.GetPrim()).GetMaterialBindSubsets():
-        chosen = np.isin(polygons.parents, np.array(subset.GetIndicesAttr().Get(time) or [], dtype=int)) & rest
+        chosen = np.isin(polygons.parents, _array(subset.GetIndicesAttr(), time, int)) & rest
         if chosen.any():
             found.append((subset.GetPrim(), chosen))
             rest &= ~chosen

@@ -73,6 +73,9 @@ class Geometries:
             item = Geometry(prim, time, primitives, samples=[sample])
         else:
             shape = read_gprim(prim, time)
+            if shape is None:
+                self.lost.add(str(prim.GetPath()), "size that is no number over 0", "it is left out; check its attributes")
+                return None
             varying = [a.GetName() for a in prim.GetAttributes() if a.GetName() in _SIZES and a.ValueMightBeTimeVarying()]
             if varying:
                 self.lost.add(str(prim.GetPath()), f"animated {', '.join(varying)}", "animate its scale instead; the first frame's is used")

@@ -99,7 +99,7 @@ class Walker:
         places = instancer.ComputeInstanceTransformsAtTime(time, time, UsdGeom.PointInstancer.IncludeProtoXform, UsdGeom.PointInstancer.IgnoreMask)
         mask = instancer.ComputeMaskAtTime(time)
         ids = instancer.GetIdsAttr().Get(time)
-        if len(places) != len(which) or (ids is not None and len(ids) != len(which)):
+        if len(places) != len(which) or (ids is not None and (not hasattr(ids, "__len__") or len(ids) != len(which))):
             self.lost.add(path, "PointInstancer whose arrays differ in length", "it is left out; check it with usdchecker")
             return
         for i, number in enumerate(which):
