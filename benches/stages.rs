@@ -15,7 +15,7 @@ use buzz::output::exr::encode;
 use buzz::output::{Compression, FileOptions, MemorySink, SettingsHasher};
 use buzz::plan::{Plan, PlannedFrame, Segment};
 use buzz::scene::{Scene, View};
-use buzz::sequence::{FrameSink, Observer, Settings, render_sequence};
+use buzz::sequence::{FrameSink, Settings, Unwatched, render_sequence};
 use buzz::trace::{TraceOptions, Tracer};
 use criterion::{Criterion, criterion_group, criterion_main};
 use glam::DVec3;
@@ -32,12 +32,6 @@ impl CastRays for Caster<'_> {
     fn cast(&self, x: usize, y: usize, lit: &mut [u32], counts: &mut RayCounts) -> SurfaceSample {
         self.0.cast(self.1, x as f64 + 0.5, y as f64 + 0.5, lit, counts)
     }
-}
-
-struct Quiet;
-
-impl Observer for Quiet {
-    fn frame_done(&mut self, _: i64, _: buzz::frame::FrameKind, _: &buzz::frame::FrameStats, _: bool) {}
 }
 
 fn view(scene: &Scene, frame: i64) -> View {
@@ -112,7 +106,7 @@ fn rendered(scene: &Scene, sink: &mut MemorySink) -> Frame {
     let plan = Plan { frames: vec![planned], segments: vec![segment], ..Plan::default() };
     let mut accel = Accel::new(scene);
     let frames = [FRAME].into();
-    render_sequence(scene, &mut accel, &settings, &plan, &frames, sink, &mut Quiet)
+    render_sequence(scene, &mut accel, &settings, &plan, &frames, sink, &mut Unwatched)
         .expect("nothing can be written wrongly");
     sink.finish().expect("memory");
     sink.frames.pop().expect("one frame was asked for")

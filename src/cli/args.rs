@@ -82,7 +82,7 @@ pub struct CompareArgs {
     #[arg(long, value_enum, default_value = "text")]
     pub format: Format,
     /// Exit with 1 if any frame's PSNR is under this.
-    #[arg(long, value_name = "DB")]
+    #[arg(long, value_name = "DB", allow_negative_numbers = true)]
     pub fail_below: Option<f64>,
 }
 
@@ -144,7 +144,7 @@ pub struct OutputArgs {
     #[arg(long, default_value_t = 0.0, allow_negative_numbers = true)]
     pub exposure: f32,
     /// Depth of reflection and refraction.
-    #[arg(long, default_value_t = 4)]
+    #[arg(long, default_value_t = 4, value_parser = clap::value_parser!(u32).range(..=64))]
     pub bounces: u32,
     /// Cast a ray to every reused sample and report how many are hidden (slow).
     #[arg(long)]

@@ -1,11 +1,12 @@
 //! `buzz-convert INPUT OUT_DIR`: the main job.
 
 use super::args::{CompressionArg, ConvertArgs};
-use super::interrupt;
+use super::interrupt::Interrupt;
 use super::job::{Job, stem, warn_of_ignored};
 use super::parse;
 use super::progress::{Progress, Tally};
-use anyhow::Result;
+use super::say;
+use anyhow::{Context, Result};
 use buzz::error::Error;
 use buzz::frame::{FrameKind, FrameStats};
 use buzz::infer::BuzzBuffer;
@@ -26,7 +27,7 @@ pub fn run(args: ConvertArgs) -> Result<ExitCode> {
     let (Some(input), Some(out_dir)) = (&args.input, &args.out_dir) else {
         return Err(Error::Usage("INPUT and OUT_DIR are missing".into()).into());
     };
-    let signal = interrupt::watch()?;
+    let interrupt = Interrupt::watch().context("signals cannot be watched")?;
     let names =
         NamePattern::parse(args.output.name.as_deref().unwrap_or(NamePattern::DEFAULT), &stem(input))?;
     let asked = args.output.frames.as_deref().map(parse::frames).transpose()?;
@@ -37,19 +38,23 @@ pub fn run(args: ConvertArgs) -> Result<ExitCode> {
     let frames = asked.unwrap_or_else(|| (timing.first..=timing.last).collect());
 
     let hash = settings_hash(&job, &args);
+    interrupt.writing();
+    if let Some(path) = &args.output.report {
+        prepare_report(path)?;
+    }
     let folder = OutputFolder::open(out_dir, names, frames.iter().copied())?;
     if !folder.is_locked() {
         let path = folder.path().display();
-        eprintln!(
-            "buzz-convert: warning: {path}: the file system has no locks: do not run twice on the same frames"
-        );
+        say::complain(format_args!(
+            "warning: {path}: the file system has no locks: do not run twice on the same frames"
+        ));
     }
     let skipped = existing(&folder, &frames, &hash, &args)?;
     let to_render: BTreeSet<i64> =
         frames.difference(&skipped.iter().map(|r| r.number).collect()).copied().collect();
 
     let planning = Instant::now();
-    let plan = job.plan();
+    let plan = job.plan(&*interrupt)?;
     let plan_seconds = planning.elapsed().as_secs_f64();
 
     let options = FileOptions {
@@ -60,7 +65,7 @@ pub fn run(args: ConvertArgs) -> Result<ExitCode> {
     };
     let mut sink = ExrSink::new(folder, options)?;
     let pixels = job.settings.window.pixels() as u64;
-    let progress = Progress::new(args.output.progress, to_render.len(), pixels, signal);
+    let progress = Progress::new(args.output.progress, to_render.len(), pixels, interrupt);
     let mut recorder = Recorder { progress, records: skipped };
     let Job { scene, accel, settings, .. } = &mut job;
     let rendered = render_sequence(scene, accel, settings, &plan, &to_render, &mut sink, &mut recorder);
@@ -76,9 +81,9 @@ pub fn run(args: ConvertArgs) -> Result<ExitCode> {
     }
     records.sort_by_key(|r| r.number);
     for (frame, values) in sink.repaired() {
-        eprintln!(
-            "buzz-convert: warning: frame {frame}: {values} values were not finite or too large for their channel and were replaced"
-        );
+        say::complain(format_args!(
+            "warning: frame {frame}: {values} values were not finite or too large for their channel and were replaced"
+        ));
     }
 
     let seconds = RunSeconds {
@@ -92,8 +97,24 @@ pub fn run(args: ConvertArgs) -> Result<ExitCode> {
     let path = args.output.report.clone().unwrap_or_else(|| out_dir.join(report_name(&frames, whole)));
     report.write_json(&path)?;
     report.write_html(&path.with_extension("html"))?;
-    summarise(&report);
+    say::result(&summary(&report))?;
     Ok(ExitCode::SUCCESS)
+}
+
+/// Finds out before the rendering, not after it, that the report cannot be written.
+fn prepare_report(path: &Path) -> Result<()> {
+    if path.extension().is_none_or(|e| e != "json") {
+        let message =
+            format!("--report {}: expected a .json file; a page is written beside it", path.display());
+        return Err(Error::Usage(message).into());
+    }
+    if path.is_dir() {
+        return Err(Error::output(path, "is a folder; name a file in it").into());
+    }
+    let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let made = std::fs::create_dir_all(folder).and_then(|()| tempfile::tempfile_in(folder));
+    made.map_err(|e| Error::output(path, format!("the report cannot be written there ({e})")))?;
+    Ok(())
 }
 
 /// Resolves what depends on the image's size.
@@ -226,22 +247,31 @@ fn report(input: &Path, job: &Job, plan: &Plan, frames: Vec<FrameRecord>, second
 }
 
 /// Three lines: frames, rays saved, where the time went.
-fn summarise(report: &Report) {
+fn summary(report: &Report) -> String {
     let totals = &report.totals;
-    println!(
-        "{} frames: {} traced, {} inferred, in {:.1} s",
-        totals.frames, totals.traced_frames, totals.inferred_frames, totals.seconds.wall
-    );
+    let frames = if totals.frames == 1 { "frame" } else { "frames" };
     let mut tally = Tally::default();
     for frame in &report.frames {
         tally.add(frame.from.map_or(FrameKind::Traced, |from| FrameKind::Inferred { from }), frame.rays);
     }
     let saved = tally.saved().map(|s| format!("{:.1} % of camera and shadow rays saved", 100.0 * s));
     let hidden = totals.hidden.map(|h| format!("; {h} reused samples hidden")).unwrap_or_default();
-    println!("{}{hidden}", saved.unwrap_or_else(|| "no frame was traced in this run".into()));
     let s = &totals.seconds;
-    println!(
-        "seconds: {:.1} reading, {:.1} trees, {:.1} plan, {:.1} infer, {:.1} trace, {:.1} enhance, {:.1} write (beside)",
-        s.import, s.accel, s.plan, s.infer, s.trace, s.enhance, s.write
-    );
+    format!(
+        "{} {frames}: {} traced, {} inferred, in {:.1} s\n{}{hidden}\n\
+         seconds: {:.1} reading, {:.1} trees, {:.1} plan, {:.1} infer, {:.1} trace, {:.1} enhance, \
+         {:.1} write (beside)\n",
+        totals.frames,
+        totals.traced_frames,
+        totals.inferred_frames,
+        s.wall,
+        saved.unwrap_or_else(|| "no frame was traced in this run".into()),
+        s.import,
+        s.accel,
+        s.plan,
+        s.infer,
+        s.trace,
+        s.enhance,
+        s.write
+    )
 }

@@ -1,7 +1,7 @@
 //! `buzz-convert inspect`: what the scene holds, what it requires, what will be ignored.
 
 use super::args::{Format, InspectArgs};
-use super::job;
+use super::{job, say};
 use anyhow::Result;
 use buzz::infer::BuzzBuffer;
 use buzz::scene::{Interpolation, LightKind, Projection, Requirements, Scene, Target};
@@ -10,10 +10,10 @@ use std::process::ExitCode;
 
 pub fn run(args: InspectArgs) -> Result<ExitCode> {
     let scene = job::read(&args.input, &args.scene)?;
-    match args.format {
-        Format::Json => println!("{}", serde_json::to_string_pretty(&as_json(&scene))?),
-        Format::Text => print!("{}", as_text(&scene)),
-    }
+    say::result(&match args.format {
+        Format::Json => serde_json::to_string_pretty(&as_json(&scene))? + "\n",
+        Format::Text => as_text(&scene),
+    })?;
     Ok(ExitCode::SUCCESS)
 }
 

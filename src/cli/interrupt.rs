@@ -1,18 +1,52 @@
-//! Ctrl-C and SIGTERM: the first asks to stop after the frame at hand, the second stops at once.
+//! Ctrl-C and SIGTERM: the first asks the run to stop, which it does at the next row of pixels; the second ends the
+//! program at once.
 
+use super::say;
+use buzz::error::Error;
+use buzz::frame::{FrameKind, FrameStats};
+use buzz::sequence::Observer;
 use signal_hook::consts::{SIGINT, SIGTERM};
+use signal_hook::iterator::Signals;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, AtomicUsize};
+use std::sync::atomic::{AtomicBool, AtomicI32, Ordering::SeqCst};
 
-/// Watches for signals; the number of the first that comes is stored in the value returned.
-pub fn watch() -> std::io::Result<Arc<AtomicUsize>> {
-    let signal = Arc::new(AtomicUsize::new(0));
-    for number in [SIGINT, SIGTERM] {
-        // The order matters: the shutdown is armed by the signal before.
-        let armed = Arc::new(AtomicBool::new(false));
-        signal_hook::flag::register_conditional_shutdown(number, 128 + number, Arc::clone(&armed))?;
-        signal_hook::flag::register(number, armed)?;
-        signal_hook::flag::register_usize(number, Arc::clone(&signal), number as usize)?;
+/// Whether the user asked to stop.
+#[derive(Debug, Default)]
+pub struct Interrupt {
+    /// Number of the last signal; 0 if none came.
+    signal: AtomicI32,
+    /// Something is being written: the run must be left to finish it.
+    writing: AtomicBool,
+}
+
+impl Interrupt {
+    /// Watches for signals from now on. Until [`Interrupt::writing`], the first ends the program too.
+    pub fn watch() -> std::io::Result<Arc<Self>> {
+        let mut signals = Signals::new([SIGINT, SIGTERM])?;
+        let interrupt = Arc::new(Self::default());
+        let shared = Arc::clone(&interrupt);
+        std::thread::Builder::new().name("buzz-signals".into()).spawn(move || {
+            for signal in signals.forever() {
+                let first = shared.signal.swap(signal, SeqCst) == 0;
+                if !(first && shared.writing.load(SeqCst)) {
+                    say::complain(Error::Interrupted { signal });
+                    std::process::exit(128 + signal);
+                }
+            }
+        })?;
+        Ok(interrupt)
     }
-    Ok(signal)
+
+    /// From now on the first signal is left to the run.
+    pub fn writing(&self) {
+        self.writing.store(true, SeqCst);
+    }
+}
+
+impl Observer for Interrupt {
+    fn frame_done(&mut self, _: i64, _: FrameKind, _: &FrameStats, _: bool) {}
+
+    fn stop_requested(&self) -> Option<i32> {
+        Some(self.signal.load(SeqCst)).filter(|&signal| signal != 0)
+    }
 }

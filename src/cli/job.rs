@@ -1,14 +1,14 @@
 //! Arguments as meant: the scene read, the camera chosen, sizes and ranges resolved.
 
 use super::args::{ImageArgs, QualityArg, SceneArgs};
-use super::parse;
+use super::{parse, say};
 use anyhow::{Context, Result};
 use buzz::accel::Accel;
 use buzz::error::Error;
 use buzz::import::{ImportOptions, import};
 use buzz::plan::{Plan, PlanOptions, plan};
-use buzz::scene::Scene;
-use buzz::sequence::{Quality, Settings, camera_path};
+use buzz::scene::{Ignored, Scene};
+use buzz::sequence::{Observer, Quality, Settings, camera_path};
 use std::path::Path;
 use std::time::Instant;
 
@@ -36,8 +36,9 @@ impl Job {
         let import_seconds = start.elapsed().as_secs_f64();
         require_camera(&scene, input)?;
         if let Some(first) = scene_args.start_frame {
-            renumber(&mut scene, first);
+            renumber(&mut scene, first)?;
         }
+        refuse_endless(&scene, input)?;
         let own = scene.timing.resolution.unwrap_or((1280, 720));
         let (width, height) =
             image.resolution.as_deref().map_or(Ok(own), |text| parse::resolution(text, own))?;
@@ -54,14 +55,14 @@ impl Job {
     }
 
     /// Plans the scene's own range.
-    pub fn plan(&mut self) -> Plan {
-        let path = camera_path(&self.scene, &mut self.accel, &self.settings);
+    pub fn plan(&mut self, observer: &dyn Observer) -> Result<Plan> {
+        let path = camera_path(&self.scene, &mut self.accel, &self.settings, observer)?;
         let full = self.quality == Quality::Full;
         let cuts: Vec<i64> = match self.settings.camera {
             Some(_) => Vec::new(),
             None => self.scene.cuts.iter().map(|c| c.frame).collect(),
         };
-        plan(&path, &cuts, PlanOptions { full, longest_segment: self.longest_segment })
+        Ok(plan(&path, &cuts, PlanOptions { full, longest_segment: self.longest_segment }))
     }
 }
 
@@ -80,10 +81,8 @@ pub fn read(input: &Path, args: &SceneArgs) -> Result<Scene> {
 /// Says once what of the scene is not rendered.
 pub fn warn_of_ignored(scene: &Scene) {
     for ignored in &scene.ignored {
-        eprintln!(
-            "buzz-convert: warning: {}: {} is not rendered: {}",
-            ignored.place, ignored.feature, ignored.effect
-        );
+        let Ignored { place, feature, effect } = ignored;
+        say::complain(format_args!("warning: {place}: {feature} is not rendered: {effect}"));
     }
 }
 
@@ -92,9 +91,12 @@ pub fn stem(input: &Path) -> String {
     input.file_stem().map_or_else(|| "frame".to_owned(), |s| s.to_string_lossy().into_owned())
 }
 
+/// More than any machine has; a typo must not start a thread for each of its digits.
+const MOST_THREADS: usize = 1024;
+
 fn use_threads(threads: Option<usize>) -> Result<usize> {
-    if threads == Some(0) {
-        return Err(Error::Usage("--threads 0: expected at least 1".into()).into());
+    if let Some(number) = threads.filter(|n| !(1..=MOST_THREADS).contains(n)) {
+        return Err(Error::Usage(format!("--threads {number}: expected 1 to {MOST_THREADS}")).into());
     }
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads.unwrap_or(0));
     pool.build_global().context("the threads could not be started")?;
@@ -109,7 +111,10 @@ fn require_camera(scene: &Scene, input: &Path) -> Result<()> {
     Ok(())
 }
 
-fn renumber(scene: &mut Scene, first: i64) {
+fn renumber(scene: &mut Scene, first: i64) -> Result<()> {
+    if !parse::is_frame_number(first) {
+        return Err(Error::Usage(format!("--start-frame {first}: expected {}", parse::FRAME_NUMBERS)).into());
+    }
     let shift = first - scene.timing.first;
     let timing = &mut scene.timing;
     for number in [&mut timing.frame_start, &mut timing.first, &mut timing.last] {
@@ -118,6 +123,21 @@ fn renumber(scene: &mut Scene, first: i64) {
     for cut in &mut scene.cuts {
         cut.frame += shift;
     }
+    Ok(())
+}
+
+/// Longest range that is planned: more than an hour. A misplaced key must not fill the memory.
+const MOST_FRAMES: i64 = 100_000;
+
+fn refuse_endless(scene: &Scene, input: &Path) -> Result<()> {
+    let frames = scene.timing.last - scene.timing.first + 1;
+    if frames <= MOST_FRAMES {
+        return Ok(());
+    }
+    let message = format!(
+        "the animation has {frames} frames, more than {MOST_FRAMES}; see whether the last key is misplaced, or give a lower --fps"
+    );
+    Err(Error::input(input, "/animations", message).into())
 }
 
 fn find_camera(scene: &Scene, name: &str) -> Result<usize> {

@@ -11,6 +11,7 @@ mod job;
 mod parse;
 mod plan;
 mod progress;
+mod say;
 
 use anyhow::Result;
 use args::{Cli, Command};
@@ -22,15 +23,19 @@ pub fn run() -> ExitCode {
     let cli = match Cli::try_parse() {
         Ok(cli) => cli,
         Err(error) => {
-            // A reader that went away is no reason to fail: there is nobody to tell.
+            if error.use_stderr() {
+                say::complain(one_line(&error.to_string()));
+                return ExitCode::from(2);
+            }
+            // Help or the version. A reader that went away is no reason to fail.
             let _ = error.print();
-            return ExitCode::from(if error.use_stderr() { 2 } else { 0 });
+            return ExitCode::SUCCESS;
         }
     };
     match dispatch(cli) {
         Ok(code) => code,
         Err(error) => {
-            eprintln!("buzz-convert: {error:#}");
+            say::complain(format_args!("{error:#}"));
             let code = error.downcast_ref::<buzz::Error>().map_or(1, buzz::Error::exit_code);
             ExitCode::from(code)
         }
@@ -43,5 +48,34 @@ fn dispatch(cli: Cli) -> Result<ExitCode> {
         Some(Command::Inspect(args)) => inspect::run(args),
         Some(Command::Compare(args)) => compare::run(args),
         None => convert::run(cli.convert),
+    }
+}
+
+/// What the parser says, without the usage that it adds.
+fn one_line(text: &str) -> String {
+    let lines =
+        text.lines().map(str::trim).take_while(|l| !l.starts_with("Usage:") && !l.starts_with("For more"));
+    let said = lines.filter(|l| !l.is_empty()).collect::<Vec<_>>().join(" ");
+    format!("{}; --help lists all options", said.strip_prefix("error: ").unwrap_or(&said))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_the_parser_says_fits_on_a_line() {
+        let said = |arguments: &[&str]| {
+            let error = Cli::try_parse_from([&["buzz-convert"], arguments].concat()).unwrap_err();
+            one_line(&error.to_string())
+        };
+        assert_eq!(
+            said(&["a.gltf"]),
+            "the following required arguments were not provided: <OUT_DIR>; --help lists all options"
+        );
+        assert!(
+            said(&["a.gltf", "out", "--frame", "1"]).contains("tip: a similar argument exists: '--frames'")
+        );
+        assert!(said(&["a.gltf", "out", "-q", "best"]).contains("possible values: full"));
     }
 }

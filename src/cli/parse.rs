@@ -12,6 +12,14 @@ fn usage(option: &str, text: &str, wanted: &str) -> Error {
     Error::Usage(format!("{option} {text}: expected {wanted}"))
 }
 
+/// What `is_frame_number` accepts, in words.
+pub const FRAME_NUMBERS: &str = "a frame number from -1000000000 to 1000000000";
+
+/// EXR files keep frame numbers in 32 bits.
+pub fn is_frame_number(number: i64) -> bool {
+    (-1_000_000_000..=1_000_000_000).contains(&number)
+}
+
 /// `1-100`, `1-100x2`, `1-7:2`, `1-10,20-30`, `7-7`, `7`, `-3--1`.
 pub fn frames(text: &str) -> Result<BTreeSet<i64>> {
     let error = || usage("--frames", text, "ranges like 1-100, 1-100x2 or 1-10,20-30, first to last");
@@ -33,9 +41,12 @@ pub fn frames(text: &str) -> Result<BTreeSet<i64>> {
             Some((i, _)) => (&range[..i], &range[i + 1..]),
             None => (range, range),
         };
-        let number = |s: &str| s.trim().parse::<i64>().map_err(|_| error());
+        let number = |s: &str| s.trim().parse::<i64>().ok().filter(|&n| is_frame_number(n)).ok_or_else(error);
         let (first, last) = (number(first)?, number(last)?);
-        let length = last.checked_sub(first).filter(|&l| l >= 0).ok_or_else(error)?;
+        if last < first {
+            return Err(error());
+        }
+        let length = last - first;
         if length / step >= MOST_FRAMES {
             return Err(usage("--frames", text, &format!("at most {MOST_FRAMES} frames")));
         }
@@ -60,7 +71,8 @@ pub fn fps(text: &str) -> Result<Rational> {
         return Ok(ntsc);
     }
     let scale = if rate.fract() == 0.0 { 1 } else { 1000 };
-    Ok(Rational { numerator: (rate * f64::from(scale)).round() as u32, denominator: scale })
+    let numerator = (rate * f64::from(scale)).round() as u32;
+    if numerator > 0 { Ok(Rational { numerator, denominator: scale }) } else { Err(error()) }
 }
 
 /// Longest side that is accepted.
@@ -171,7 +183,7 @@ mod tests {
         ] {
             assert_eq!(fps(text).unwrap(), Rational { numerator: n, denominator: d });
         }
-        for bad in ["0", "-1", "24/0", "x", "nan", "inf"] {
+        for bad in ["0", "-1", "24/0", "x", "nan", "inf", "0.0001"] {
             assert!(fps(bad).is_err(), "{bad}");
         }
     }

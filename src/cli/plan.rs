@@ -2,21 +2,23 @@
 
 use super::args::{Format, PlanArgs};
 use super::job::{Job, warn_of_ignored};
+use super::say;
 use anyhow::Result;
 use buzz::frame::FrameKind;
 use buzz::plan::Plan;
 use buzz::scene::Projection;
+use buzz::sequence::Unwatched;
 use serde_json::{Value, json};
 use std::process::ExitCode;
 
 pub fn run(args: PlanArgs) -> Result<ExitCode> {
     let mut job = Job::new(&args.input, &args.scene, &args.image)?;
     warn_of_ignored(&job.scene);
-    let plan = job.plan();
-    match args.format {
-        Format::Json => println!("{}", serde_json::to_string_pretty(&as_json(&job, &plan))?),
-        Format::Text => print!("{}", as_text(&plan)),
-    }
+    let plan = job.plan(&Unwatched)?;
+    say::result(&match args.format {
+        Format::Json => serde_json::to_string_pretty(&as_json(&job, &plan))? + "\n",
+        Format::Text => as_text(&plan),
+    })?;
     Ok(ExitCode::SUCCESS)
 }
 

@@ -1,12 +1,13 @@
 //! What an artist sees while it runs, and what stops it.
 
 use super::args::ProgressArg;
+use super::interrupt::Interrupt;
+use super::say;
 use buzz::frame::{FrameKind, FrameStats, RayCounts};
 use buzz::sequence::Observer;
 use indicatif::{HumanDuration, ProgressBar, ProgressDrawTarget, ProgressStyle};
 use std::io::IsTerminal;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
 use std::time::{Duration, Instant};
 
 /// Counts frames and rays, prints them, and passes on a request to stop.
@@ -17,7 +18,7 @@ pub struct Progress {
     pixels: u64,
     tally: Tally,
     start: Instant,
-    signal: Arc<AtomicUsize>,
+    interrupt: Arc<Interrupt>,
 }
 
 enum Style {
@@ -55,8 +56,8 @@ impl Tally {
 }
 
 impl Progress {
-    /// Progress of `total` frames of `pixels` pixels; `signal` holds the number of a signal that came.
-    pub fn new(style: ProgressArg, total: usize, pixels: u64, signal: Arc<AtomicUsize>) -> Self {
+    /// Progress of `total` frames of `pixels` pixels; `interrupt` knows whether to stop.
+    pub fn new(style: ProgressArg, total: usize, pixels: u64, interrupt: Arc<Interrupt>) -> Self {
         let style = match style {
             ProgressArg::Auto if std::io::stderr().is_terminal() => Style::Bar(bar(total)),
             ProgressArg::Bar => Style::Bar(bar(total)),
@@ -64,7 +65,7 @@ impl Progress {
             ProgressArg::Openjd => Style::Openjd,
             ProgressArg::None => Style::None,
         };
-        Self { style, total, done: 0, pixels, tally: Tally::default(), start: Instant::now(), signal }
+        Self { style, total, done: 0, pixels, tally: Tally::default(), start: Instant::now(), interrupt }
     }
 
     /// Leaves the terminal as it was.
@@ -81,7 +82,7 @@ impl Progress {
 
     fn say(&self, number: i64, kind: FrameKind, stats: &FrameStats) {
         let saved =
-            self.tally.saved().map(|s| format!("{:.1} % of rays saved", s * 100.0)).unwrap_or_default();
+            self.tally.saved().map(|s| format!(", {:.1} % of rays saved", s * 100.0)).unwrap_or_default();
         let how = match kind {
             FrameKind::Traced => "traced".to_owned(),
             FrameKind::Inferred { from } => format!("inferred from {from}"),
@@ -89,28 +90,25 @@ impl Progress {
         let share = 100.0 * stats.rays.primary as f64 / self.pixels.max(1) as f64;
         match &self.style {
             Style::Bar(bar) => {
-                bar.set_message(format!("frame {number} {how}, {saved}"));
+                bar.set_message(format!("frame {number} {how}{saved}"));
                 bar.inc(1);
             }
-            Style::Plain => eprintln!(
-                "frame {number}: {how}, {share:.1} % of pixels traced; {}/{}, {saved}, {} left",
+            Style::Plain => say::line(format_args!(
+                "frame {number}: {how}, {share:.1} % of pixels traced; {}/{}{saved}, {} left",
                 self.done,
                 self.total,
                 HumanDuration(self.left())
-            ),
+            )),
             Style::Openjd => {
-                println!("openjd_progress: {:.1}", 100.0 * self.done as f64 / self.total.max(1) as f64);
-                println!("openjd_status: frame {number} {how}, {saved}");
-                flush();
+                let percent = 100.0 * self.done as f64 / self.total.max(1) as f64;
+                let lines =
+                    format!("openjd_progress: {percent:.1}\nopenjd_status: frame {number} {how}{saved}\n");
+                // A reader that cannot be reached is no error of the frame's.
+                let _ = say::result(&lines);
             }
             Style::None => {}
         }
     }
-}
-
-/// A farm reads each line as it comes; a pipe would hold it back. A reader that went away is no error of the frame's.
-fn flush() {
-    let _ = std::io::Write::flush(&mut std::io::stdout());
 }
 
 fn bar(total: usize) -> ProgressBar {
@@ -132,9 +130,6 @@ impl Observer for Progress {
     }
 
     fn stop_requested(&self) -> Option<i32> {
-        match self.signal.load(Relaxed) {
-            0 => None,
-            signal => Some(signal as i32),
-        }
+        self.interrupt.stop_requested()
     }
 }

@@ -110,10 +110,13 @@ impl BuzzBuffer {
         counts
     }
 
-    /// Casts a ray through the centre of every pixel that is unknown.
+    /// Casts a ray through the centre of every pixel that is unknown; if the caster is cancelled, some stay so.
     pub fn cast_unknown(&mut self, projector: &Projector, rays: &impl CastRays) -> RayCounts {
         let cast_row = |y: usize, row: Row<'_>| {
             let mut counts = RayCounts::default();
+            if rays.is_cancelled() {
+                return counts;
+            }
             for x in 0..row.object.len() {
                 if row.object[x] != UNKNOWN {
                     continue;
@@ -183,6 +186,11 @@ pub(super) struct Row<'a> {
 pub trait CastRays: Sync {
     /// The sample that the ray through the centre of pixel (x, y) finds; sets `lit`, counts what it casts.
     fn cast(&self, x: usize, y: usize, lit: &mut [u32], counts: &mut RayCounts) -> SurfaceSample;
+
+    /// True if the result is not wanted any more: no further row is begun. Once true, it stays true.
+    fn is_cancelled(&self) -> bool {
+        false
+    }
 }
 
 /// The paper's four by four matrix and perspective division: where a stored hit lies in a view.

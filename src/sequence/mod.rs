@@ -93,14 +93,30 @@ impl Settings {
     }
 }
 
-/// Told what happens, and asked whether to go on.
-pub trait Observer {
+/// Told what happens, and asked whether to go on: by all threads, at every row of pixels.
+pub trait Observer: Sync {
     /// A frame is finished; if it was `wanted` it has been given to the sink, otherwise others hang on it.
     fn frame_done(&mut self, number: i64, kind: FrameKind, stats: &FrameStats, wanted: bool);
 
-    /// The signal by which the user asked to stop, if so.
+    /// The signal by which the user asked to stop, if so; once there is one, there is always one.
     fn stop_requested(&self) -> Option<i32> {
         None
+    }
+}
+
+/// For those who need to know nothing and never stop.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Unwatched;
+
+impl Observer for Unwatched {
+    fn frame_done(&mut self, _: i64, _: FrameKind, _: &FrameStats, _: bool) {}
+}
+
+/// An error if the user asked to stop.
+fn go_on(observer: &dyn Observer) -> Result<()> {
+    match observer.stop_requested() {
+        Some(signal) => Err(Error::Interrupted { signal }),
+        None => Ok(()),
     }
 }
 
@@ -188,8 +204,7 @@ fn render_segment(
     let key_shot = shot(scene, settings, segment.key);
     let start = Instant::now();
     key.forget(PixelClass::Traced);
-    let rays =
-        key.cast_unknown(&Projector::new(&key_shot.view, origin), &Caster::new(&tracer, &key_shot.view));
+    let rays = key.cast_unknown(&Projector::new(&key_shot.view, origin), &emitter.caster(&key_shot.view));
     let mut stats = FrameStats { rays, ..FrameStats::default() };
     stats.seconds.trace = start.elapsed().as_secs_f64();
     emitter.emit(segment.key, FrameKind::Traced, &key_shot, key, stats)?;
@@ -203,7 +218,7 @@ fn render_segment(
             let to = shot(scene, settings, number);
             let source = if i == 0 { &*key } else { &*old };
             let start = Instant::now();
-            let caster = Caster::new(&tracer, &to.view);
+            let caster = emitter.caster(&to.view);
             let cost = inference.infer((source, &from.view), (new, &to.view), origin, &caster);
             let mut stats = FrameStats { rays: cost.rays, ..FrameStats::default() };
             stats.seconds.trace = cost.tracing.as_secs_f64();
@@ -235,15 +250,14 @@ fn shot(scene: &Scene, settings: &Settings, frame: i64) -> Shot {
 struct Caster<'a> {
     tracer: &'a Tracer<'a>,
     view: &'a View,
-}
-
-impl<'a> Caster<'a> {
-    fn new(tracer: &'a Tracer<'a>, view: &'a View) -> Self {
-        Self { tracer, view }
-    }
+    observer: &'a dyn Observer,
 }
 
 impl CastRays for Caster<'_> {
+    fn is_cancelled(&self) -> bool {
+        self.observer.stop_requested().is_some()
+    }
+
     fn cast(&self, x: usize, y: usize, lit: &mut [u32], counts: &mut RayCounts) -> SurfaceSample {
         self.tracer.cast(self.view, x as f64 + 0.5, y as f64 + 0.5, lit, counts)
     }
@@ -263,6 +277,11 @@ struct Emitter<'a> {
 }
 
 impl Emitter<'_> {
+    fn caster<'a>(&'a self, view: &'a View) -> Caster<'a> {
+        Caster { tracer: self.tracer, view, observer: &*self.observer }
+    }
+
+    /// Finishes a frame, unless the user asked to stop: then its samples may be missing, and it is dropped.
     fn emit(
         &mut self,
         number: i64,
@@ -271,6 +290,7 @@ impl Emitter<'_> {
         buffer: &BuzzBuffer,
         mut stats: FrameStats,
     ) -> Result<()> {
+        go_on(self.observer)?;
         if self.wanted.contains(&number) {
             let start = Instant::now();
             stats.pixels = buffer.count_classes();
@@ -283,6 +303,7 @@ impl Emitter<'_> {
                 scene: self.scene,
                 settings: self.settings,
                 tracer: self.tracer,
+                observer: &*self.observer,
                 origin: self.origin,
                 shot,
                 next: self.neighbour(shot, number + 1, self.cuts.contains(&(number + 1))),
@@ -291,16 +312,14 @@ impl Emitter<'_> {
             stats.rays += resolver.resolve(buffer, &mut frame);
             stats.seconds.enhance = start.elapsed().as_secs_f64();
             if self.settings.audit {
-                stats.hidden = Some(count_hidden(self.tracer, &shot.view, buffer));
+                stats.hidden = Some(count_hidden(self.tracer, &*self.observer, &shot.view, buffer));
             }
+            go_on(self.observer)?;
             frame.stats = stats;
             self.sink.put(frame)?;
         }
         self.observer.frame_done(number, kind, &stats, self.wanted.contains(&number));
-        match self.observer.stop_requested() {
-            Some(signal) => Err(Error::Interrupted { signal }),
-            None => Ok(()),
-        }
+        go_on(self.observer)
     }
 
     /// The frame next to `shot`, for motion; none across a cut or outside the range.

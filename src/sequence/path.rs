@@ -1,16 +1,26 @@
 //! The camera's path as the planner wants it.
 
-use super::Settings;
+use super::{Observer, Settings, go_on};
+use crate::Result;
 use crate::accel::{Accel, Sides};
 use crate::plan::{PathFrame, ProbePoint};
 use crate::scene::{Pose, Scene, View};
 use rayon::prelude::*;
 
 /// Every frame of the scene's range: the camera, a coarse probe of what it sees, and whether the scene changed.
-pub fn camera_path(scene: &Scene, accel: &mut Accel, settings: &Settings) -> Vec<PathFrame> {
+///
+/// # Errors
+/// [`crate::Error::Interrupted`] if `observer` asks to stop.
+pub fn camera_path(
+    scene: &Scene,
+    accel: &mut Accel,
+    settings: &Settings,
+    observer: &dyn Observer,
+) -> Result<Vec<PathFrame>> {
     let mut path: Vec<PathFrame> = Vec::new();
     let mut before: Option<Pose> = None;
     for frame in scene.timing.first..=scene.timing.last {
+        go_on(observer)?;
         let pose = scene.pose(scene.timing.time_of(frame));
         let camera = scene.camera_at(frame, settings.camera);
         let view = scene.view(&pose, camera, settings.width, settings.height);
@@ -23,7 +33,7 @@ pub fn camera_path(scene: &Scene, accel: &mut Accel, settings: &Settings) -> Vec
         path.push(PathFrame { frame, view, probe: probe(scene, accel, &view), scene_changed });
         before = Some(pose);
     }
-    path
+    Ok(path)
 }
 
 fn probe(scene: &Scene, accel: &Accel, view: &View) -> Vec<ProbePoint> {

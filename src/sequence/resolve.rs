@@ -1,6 +1,6 @@
 //! From samples to a frame's layers: the paper's enhancement of every pixel, traced or reused alike.
 
-use super::{Settings, Shot};
+use super::{Observer, Settings, Shot};
 use crate::accel::Displaced;
 use crate::frame::{Aov, Frame, FrameKind, FrameStats, RayCounts, SurfaceSample, Window};
 use crate::infer::BuzzBuffer;
@@ -14,6 +14,8 @@ pub(super) struct Resolver<'a> {
     pub scene: &'a Scene,
     pub settings: &'a Settings,
     pub tracer: &'a Tracer<'a>,
+    /// Asked at each row whether to go on.
+    pub observer: &'a dyn Observer,
     /// Sample positions are relative to this.
     pub origin: DVec3,
     pub shot: &'a Shot,
@@ -77,6 +79,9 @@ impl Resolver<'_> {
     fn shade(&self, buffer: &BuzzBuffer, frame: &mut Frame, width: usize) -> RayCounts {
         let shade_row = |y: usize, row: Row<'_>| {
             let mut counts = RayCounts::default();
+            if self.observer.stop_requested().is_some() {
+                return counts;
+            }
             for (x, color) in row.color.iter_mut().enumerate() {
                 let i = y * width + x;
                 let pixel = self.pixel(&buffer.sample(i), buffer.lit(i), &mut counts);
@@ -188,9 +193,17 @@ fn finite_depth(z: f32) -> f32 {
 }
 
 /// Reused samples that something hides from the eye (the audit).
-pub(super) fn count_hidden(tracer: &Tracer<'_>, view: &View, buffer: &BuzzBuffer) -> u64 {
+pub(super) fn count_hidden(
+    tracer: &Tracer<'_>,
+    observer: &dyn Observer,
+    view: &View,
+    buffer: &BuzzBuffer,
+) -> u64 {
     let pixels = (0..buffer.class.len()).into_par_iter();
-    let hidden = |&i: &usize| buffer.class[i].is_reused() && tracer.is_hidden(view, &buffer.sample(i));
+    let hidden = |&i: &usize| {
+        let asked = buffer.class[i].is_reused() && observer.stop_requested().is_none();
+        asked && tracer.is_hidden(view, &buffer.sample(i))
+    };
     pixels.filter(hidden).count() as u64
 }
 

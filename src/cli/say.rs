@@ -1,0 +1,29 @@
+//! What is printed: results on standard output, everything else on standard error.
+//!
+//! The macros of the standard library panic when nobody reads any more (`| head`, a closed terminal); a run of hours
+//! must not end by that.
+
+use buzz::error::{Error, Result};
+use std::fmt::Display;
+use std::io::{ErrorKind, Write, stderr, stdout};
+
+/// Prints a result. A reader that went away has seen what it wanted.
+pub fn result(text: &str) -> Result<()> {
+    let mut out = stdout().lock();
+    match out.write_all(text.as_bytes()).and_then(|()| out.flush()) {
+        Err(error) if error.kind() != ErrorKind::BrokenPipe => {
+            Err(Error::output("standard output", error.to_string()))
+        }
+        _ => Ok(()),
+    }
+}
+
+/// A line on standard error; if it cannot be written, there is nobody to tell.
+pub fn line(text: impl Display) {
+    let _ = writeln!(stderr(), "{text}");
+}
+
+/// An error or a warning.
+pub fn complain(text: impl Display) {
+    line(format_args!("buzz-convert: {text}"));
+}
