@@ -90,7 +90,7 @@ pub struct CompareArgs {
 #[derive(Debug, Args)]
 pub struct SceneArgs {
     /// Frames per second: 24, 23.976 or 24000/1001 [default: the scene's, else 24].
-    #[arg(long)]
+    #[arg(long, allow_hyphen_values = true)]
     pub fps: Option<String>,
     /// Camera by name or index [default: the scene's cuts, else the first animated camera, else the first].
     #[arg(short, long)]
@@ -135,7 +135,7 @@ pub struct OutputArgs {
     #[arg(short, long, allow_hyphen_values = true)]
     pub frames: Option<String>,
     /// Render only this part: x,y,width,height in pixels of the full frame.
-    #[arg(long)]
+    #[arg(long, allow_hyphen_values = true)]
     pub crop: Option<String>,
     /// Colour and alpha are 0 where only the world is seen.
     #[arg(long)]
@@ -144,13 +144,13 @@ pub struct OutputArgs {
     #[arg(long, default_value_t = 0.0, allow_negative_numbers = true)]
     pub exposure: f32,
     /// Depth of reflection and refraction.
-    #[arg(long, default_value_t = 4, value_parser = clap::value_parser!(u32).range(..=64))]
+    #[arg(long, default_value_t = 4, allow_negative_numbers = true, value_parser = clap::value_parser!(u32).range(..=64))]
     pub bounces: u32,
     /// Cast a ray to every reused sample and report how many are hidden (slow).
     #[arg(long)]
     pub audit: bool,
     /// Layers beside the beauty: depth class normal position motion object diffuse specular emission lights, by
-    /// commas; or all, or beauty.
+    /// commas; or all, or beauty (depth,class).
     #[arg(long, default_value = "depth,class")]
     pub aov: String,
     /// Compression of the EXR files.

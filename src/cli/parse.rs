@@ -67,7 +67,7 @@ pub fn fps(text: &str) -> Result<Rational> {
         return Err(error());
     }
     let ntsc = Rational { numerator: (rate.round() * 1000.0) as u32, denominator: 1001 };
-    if rate.fract() != 0.0 && (ntsc.value() - rate).abs() < 0.005 {
+    if rate.fract() != 0.0 && ntsc.numerator > 0 && (ntsc.value() - rate).abs() < 0.005 {
         return Ok(ntsc);
     }
     let scale = if rate.fract() == 0.0 { 1 } else { 1000 };
@@ -130,7 +130,7 @@ pub fn aovs(text: &str) -> Result<AovSet> {
         match (name, NAMES.iter().find(|(n, _)| *n == name)) {
             (_, Some((_, aov))) => set = set.with(*aov),
             ("all", _) => set = NAMES.iter().map(|(_, aov)| *aov).collect(),
-            ("beauty", _) => {}
+            ("beauty", _) => set = set.with(Aov::Depth).with(Aov::Class),
             _ => {
                 let names: Vec<&str> = NAMES.iter().map(|(n, _)| *n).collect();
                 return Err(usage("--aov", name, &format!("one of {}, all, beauty", names.join(", "))));

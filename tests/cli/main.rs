@@ -1,0 +1,14 @@
+//! The real binary, from the outside: what it writes, what it says, how it ends.
+
+#![allow(missing_docs, clippy::unwrap_used, clippy::expect_used, clippy::panic)]
+
+mod determinism;
+mod motion;
+mod options;
+mod pipes;
+mod refusals;
+mod resume;
+mod rig;
+mod stage;
+mod stopping;
+mod whole;

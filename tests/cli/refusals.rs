@@ -1,0 +1,186 @@
+//! Bad input, bad options, bad places to write to: one clear line, and the right code.
+
+use crate::rig::{buzz, fresh, listing, run};
+use crate::stage::Stage;
+use std::fs;
+
+#[test]
+fn input_that_cannot_be_rendered_is_refused_with_3() {
+    let (folder, out) = fresh();
+    let path = |name: &str| folder.path().join(name);
+    fs::write(path("broken.gltf"), r#"{"asset": {"version": "2.0"}, "#).unwrap();
+    fs::write(path("empty.gltf"), "").unwrap();
+    fs::write(path("noise.glb"), [7; 100]).unwrap();
+    fs::write(path("walk.fbx"), "Kaydara FBX Binary").unwrap();
+    fs::create_dir(path("folder.gltf")).unwrap();
+    let mut stage = Stage::drifting(2);
+    stage.json["extensionsUsed"].as_array_mut().unwrap().push("EXT_nobody_knows".into());
+    stage.json["extensionsRequired"] = serde_json::json!(["EXT_nobody_knows"]);
+    stage.write(&path("required.gltf"));
+    let mut stage = Stage::drifting(2);
+    stage.json["nodes"][0].as_object_mut().unwrap().remove("camera");
+    stage.json.as_object_mut().unwrap().remove("cameras");
+    stage.write(&path("blind.gltf"));
+    for (name, parts) in [
+        ("missing.gltf", ["missing.gltf", "No such file"]),
+        ("folder.gltf", ["folder.gltf", "not a regular file"]),
+        ("walk.fbx", ["walk.fbx", "glTF"]),
+        ("broken.gltf", ["broken.gltf", "line 1 column"]),
+        ("empty.gltf", ["empty.gltf", "JSON"]),
+        ("noise.glb", ["noise.glb", ""]),
+        ("required.gltf", ["EXT_nobody_knows", "required.gltf"]),
+        ("blind.gltf", ["camera", "--turntable"]),
+    ] {
+        run(&path(name), &out, "-r 8x8").refused(3, &parts);
+        let scene = path(name);
+        buzz(["plan", scene.to_str().unwrap(), "-r", "8x8"]).refused(3, &parts);
+    }
+    assert!(!out.exists());
+}
+
+#[test]
+fn an_animation_without_end_is_refused_before_it_fills_the_memory() {
+    let (folder, out) = fresh();
+    let scene = Stage::drifting(100).write(&folder.path().join("s.gltf"));
+    run(&scene, &out, "--fps 99999 -r 8x8").refused(3, &["frames", "--fps"]);
+}
+
+#[test]
+fn options_that_mean_nothing_are_refused_with_2() {
+    let (folder, out) = fresh();
+    let scene = Stage::drifting(2).write(&folder.path().join("s.gltf"));
+    for options in [
+        "--frames 9-1",
+        "--frames 1-",
+        "--frames 1-2x0",
+        "--frames one",
+        "--frames 0-99999999999999999999",
+        "--frames 5000000000",
+        "--frames 0-100000000",
+        "--fps 0",
+        "--fps -24",
+        "--fps 24/0",
+        "--fps 0.0001",
+        "--resolution 0x0",
+        "--resolution 64",
+        "--resolution 99999999x1",
+        "--resolution 0%",
+        "--crop 0,0,0,0",
+        "--crop 60,0,8,8",
+        "--crop 1,2,3",
+        "--crop -1,0,8,8",
+        "--aov colour",
+        "--camera Nobody",
+        "--camera 7",
+        "--name s.exr",
+        "--name s.%04d.png",
+        "--name folder/s.%04d.exr",
+        "--name %d.%d.exr",
+        "--threads 0",
+        "--threads 99999999",
+        "--threads many",
+        "--segment 0",
+        "--segment long",
+        "--exposure nan",
+        "--exposure inf",
+        "--bounces 65",
+        "--bounces -1",
+        "--start-frame 9223372036854775807",
+        "--start-frame x",
+        "--turntable 0",
+        "--turntable 4294967295",
+        "--quality best",
+        "--compression zstd",
+        "--progress loud",
+        "--report page.html",
+        "--no-such-option",
+        "stray",
+    ] {
+        let option = options.split(' ').next().unwrap();
+        let size = if option == "--resolution" { "" } else { "-r 64x36" };
+        run(&scene, &out, &format!("{size} {options}")).refused(2, &[option]);
+    }
+    buzz(["scene.gltf"]).refused(2, &["<OUT_DIR>"]);
+    buzz([""; 0]).refused(2, &["<INPUT>", "--help"]);
+    assert!(!out.exists());
+}
+
+#[test]
+fn output_that_cannot_be_written_is_refused_with_4() {
+    let (folder, out) = fresh();
+    let scene = Stage::drifting(2).write(&folder.path().join("s.gltf"));
+    run(&scene, &scene, "-r 8x8").refused(4, &["s.gltf"]);
+    run(&scene, &scene.join("in"), "-r 8x8").refused(4, &["s.gltf/in", "folder"]);
+    // Not even root can write there.
+    #[cfg(target_os = "linux")]
+    for place in ["/proc/buzz", "/proc/self/buzz"] {
+        run(&scene, place.as_ref(), "-r 8x8").refused(4, &[place]);
+        run(&scene, &out, &format!("-r 8x8 --report {place}/report.json")).refused(4, &["report.json"]);
+    }
+    let report = folder.path().join("r.json");
+    fs::create_dir(&report).unwrap();
+    run(&scene, &out, &format!("-r 8x8 --report {}", report.display())).refused(4, &["r.json", "folder"]);
+    assert!(!out.exists(), "it was found out before the rendering: {:?}", listing(&out));
+    // The folder in the way of a frame is named, too.
+    fs::create_dir_all(out.join("s.0001.exr/x")).unwrap();
+    run(&scene, &out, "-r 8x8 --overwrite --progress none").refused(4, &["s.0001.exr"]);
+}
+
+#[cfg(unix)]
+#[test]
+fn a_read_only_folder_is_refused_with_4() {
+    use std::os::unix::fs::PermissionsExt;
+    let (folder, out) = fresh();
+    let scene = Stage::drifting(2).write(&folder.path().join("s.gltf"));
+    fs::create_dir(&out).unwrap();
+    fs::set_permissions(&out, fs::Permissions::from_mode(0o555)).unwrap();
+    if fs::write(out.join("probe"), "").is_ok() {
+        return; // Permissions do not bind root.
+    }
+    run(&scene, &out, "-r 8x8").refused(4, &["out", "may be written"]);
+}
+
+#[test]
+fn what_is_ignored_is_said_once_and_refused_if_strict() {
+    let (folder, out) = fresh();
+    let mut stage = Stage::drifting(3);
+    stage.json["meshes"][1]["primitives"][0]["mode"] = 1.into();
+    let scene = stage.write(&folder.path().join("s.gltf"));
+    let said = run(&scene, &out, "-r 8x8 --progress none").ok().err;
+    assert_eq!(said.lines().count(), 1, "{said}");
+    assert!(said.contains("warning") && said.contains("/meshes/1/primitives/0"), "{said}");
+    let report = crate::rig::json(&out.join("report.json"));
+    assert_eq!(report["scene"]["ignored"].as_array().unwrap().len(), 1);
+    run(&scene, &out, "-r 8x8 --overwrite --strict").refused(3, &["/meshes/1/primitives/0"]);
+}
+
+#[test]
+fn comparisons_tell_what_they_miss() {
+    let (folder, out) = fresh();
+    let scene = Stage::drifting(2).write(&folder.path().join("s.gltf"));
+    let other = folder.path().join("other");
+    run(&scene, &out, "-r 32x18 --progress none").ok();
+    run(&scene, &other, "-r 32x18 --progress none --exposure 0.5").ok();
+    let compare = |a: &std::path::Path, b: &std::path::Path, rest: &str| {
+        let (a, b) = (a.to_str().unwrap(), b.to_str().unwrap());
+        buzz(["compare", a, b].into_iter().chain(rest.split_whitespace()))
+    };
+    compare(&folder.path().join("none"), &out, "").refused(3, &["none"]);
+    compare(&out, &folder.path().join("none"), "").refused(3, &["none"]);
+    let empty = folder.path().join("empty");
+    fs::create_dir(&empty).unwrap();
+    compare(&out, &empty, "").refused(3, &["no EXR"]);
+
+    let same = compare(&out, &out, "--format json --fail-below 99").ok();
+    let same: serde_json::Value = serde_json::from_str(&same.out).unwrap();
+    assert!(same["frames"][0]["psnr_db"].is_null() && same["worst"]["psnr_db"].is_null());
+    assert!(same["mean"]["psnr_db"].is_null());
+    assert_eq!(same["frames"][0]["max_abs"], 0.0);
+
+    let differs = compare(&out, &other, "--format json").ok();
+    let differs: serde_json::Value = serde_json::from_str(&differs.out).unwrap();
+    let worst = differs["worst"]["psnr_db"].as_f64().unwrap();
+    assert_eq!(compare(&out, &other, &format!("--fail-below {}", worst + 0.1)).code, 1);
+    compare(&out, &other, &format!("--fail-below {}", worst - 0.1)).ok();
+    compare(&out, &other, "--fail-below nan").refused(2, &["--fail-below"]);
+}

@@ -1,0 +1,113 @@
+//! Frames that are there already.
+
+use crate::rig::{Outcome, frames_in, fresh, json, run};
+use crate::stage::{CARD, Stage};
+use std::fs::{self, File};
+use std::path::{Path, PathBuf};
+use std::time::{Duration, SystemTime};
+use tempfile::TempDir;
+
+/// Four frames of a stage, rendered a day ago.
+fn rendered() -> (TempDir, PathBuf, PathBuf) {
+    let (folder, out) = fresh();
+    let scene = Stage::drifting(4).write(&folder.path().join("s.gltf"));
+    again(&scene, &out, "").ok();
+    for name in frames_in(&out) {
+        File::options().write(true).open(out.join(name)).unwrap().set_modified(yesterday()).unwrap();
+    }
+    (folder, scene, out)
+}
+
+fn yesterday() -> SystemTime {
+    SystemTime::UNIX_EPOCH + Duration::from_secs(1_700_000_000)
+}
+
+fn again(scene: &Path, out: &Path, options: &str) -> Outcome {
+    run(scene, out, &format!("-r 32x18 --progress none {options}"))
+}
+
+/// Frames that have not been written since yesterday.
+fn kept(out: &Path) -> usize {
+    let is_old = |n: &String| fs::metadata(out.join(n)).unwrap().modified().unwrap() == yesterday();
+    frames_in(out).iter().filter(|n| is_old(n)).count()
+}
+
+#[test]
+fn without_a_word_frames_are_neither_kept_nor_replaced() {
+    let (_folder, scene, out) = rendered();
+    again(&scene, &out, "").refused(4, &["s.0000.exr", "--skip-existing", "--overwrite"]);
+    again(&scene, &out, "-f 2-9").refused(4, &["s.0002.exr"]);
+    assert_eq!((frames_in(&out).len(), kept(&out)), (4, 4));
+    again(&scene, &out, "-f 10").ok();
+    assert_eq!((frames_in(&out).len(), kept(&out)), (5, 4));
+}
+
+#[test]
+fn overwriting_replaces_them() {
+    let (_folder, scene, out) = rendered();
+    let before = fs::read(out.join("s.0001.exr")).unwrap();
+    again(&scene, &out, "--overwrite").ok();
+    assert_eq!(kept(&out), 0);
+    assert_eq!(fs::read(out.join("s.0001.exr")).unwrap(), before);
+    again(&scene, &out, "--overwrite --skip-existing").refused(2, &["--overwrite", "--skip-existing"]);
+}
+
+#[test]
+fn what_decides_no_pixel_keeps_them() {
+    let (_folder, scene, out) = rendered();
+    for same in ["", "-j 1", "--progress plain", "-f 1-2", "--audit"] {
+        run(&scene, &out, &format!("-r 32x18 --skip-existing {same}")).ok();
+        assert_eq!(kept(&out), 4, "{same}");
+    }
+    let report = json(&out.join("report.json"));
+    assert_eq!(report["totals"]["frames"], 4);
+    assert!(report["frames"].as_array().unwrap().iter().all(|f| f["skipped"] == true));
+}
+
+#[test]
+fn what_decides_pixels_makes_them_anew() {
+    for other in [
+        "-r 30x18",
+        "--exposure 1",
+        "-q full",
+        "--aov depth",
+        "--compression none",
+        "--crop 0,0,8,8",
+        "--transparent",
+        "--bounces 0",
+        "--fps 24000/1001",
+        "--segment 2",
+    ] {
+        let (_folder, scene, out) = rendered();
+        let size = if other.starts_with("-r") { "" } else { "-r 32x18" };
+        run(&scene, &out, &format!("{size} --skip-existing {other}")).ok();
+        assert_eq!(kept(&out), 0, "{other}");
+    }
+}
+
+#[test]
+fn a_changed_scene_makes_them_anew() {
+    let (_folder, scene, out) = rendered();
+    let mut changed = Stage::drifting(4);
+    changed.json["nodes"][CARD]["translation"] = serde_json::json!([0.1, 0, 0]);
+    changed.write(&scene);
+    again(&scene, &out, "--skip-existing").ok();
+    assert_eq!(kept(&out), 0);
+}
+
+#[test]
+fn damaged_and_foreign_files_are_replaced() {
+    let (folder, scene, out) = rendered();
+    let whole = folder.path().join("whole");
+    again(&scene, &whole, "").ok();
+    let bytes = fs::read(out.join("s.0000.exr")).unwrap();
+    fs::write(out.join("s.0000.exr"), &bytes[..bytes.len() / 2]).unwrap();
+    fs::write(out.join("s.0001.exr"), "a foreign file").unwrap();
+    let mut flipped = bytes;
+    let last = flipped.len() - 20;
+    flipped[last] ^= 4;
+    fs::write(out.join("s.0002.exr"), flipped).unwrap();
+    again(&scene, &out, "--skip-existing").ok();
+    assert_eq!(crate::rig::assert_same_bytes(&out, &whole), 4);
+    assert_eq!(kept(&out), 1);
+}

@@ -1,0 +1,103 @@
+//! A small stage made by hand: a floor, a card that stands on it, a lamp, and a camera that may move.
+
+use base64::Engine;
+use serde_json::{Value, json};
+use std::fs;
+use std::path::{Path, PathBuf};
+
+pub const CAMERA: usize = 0;
+pub const CARD: usize = 2;
+pub const LAMP: usize = 3;
+
+pub struct Stage {
+    pub json: Value,
+    bytes: Vec<u8>,
+}
+
+impl Stage {
+    pub fn new() -> Self {
+        let material = |color: [f32; 4]| json!({"doubleSided": true, "pbrMetallicRoughness": {"baseColorFactor": color, "metallicFactor": 0, "roughnessFactor": 0.6}});
+        let json = json!({
+            "asset": {"version": "2.0"},
+            "extensionsUsed": ["KHR_lights_punctual"],
+            "extensions": {"KHR_lights_punctual": {"lights": [{"name": "Lamp", "type": "point", "intensity": 60000}]}},
+            "scene": 0,
+            "scenes": [{"nodes": [0, 1, 2, 3]}],
+            "nodes": [
+                {"name": "Cam", "camera": 0, "translation": [0, 1, 6]},
+                {"name": "Floor", "mesh": 0},
+                {"name": "Card", "mesh": 1},
+                {"name": "Lamp", "translation": [2, 4, 3], "extensions": {"KHR_lights_punctual": {"light": 0}}},
+            ],
+            "cameras": [{"type": "perspective", "perspective": {"yfov": 0.7, "znear": 0.1, "aspectRatio": 1.7778}}],
+            "materials": [material([0.8, 0.7, 0.6, 1.0]), material([0.2, 0.5, 0.9, 1.0])],
+            "meshes": [], "accessors": [], "bufferViews": [], "animations": [],
+        });
+        let mut stage = Self { json, bytes: Vec::new() };
+        let floor = [[-5.0, 0.0, 5.0], [5.0, 0.0, 5.0], [5.0, 0.0, -5.0], [-5.0, 0.0, -5.0]];
+        let card = [[-0.7, 0.0, 0.0], [0.7, 0.0, 0.0], [0.7, 1.5, 0.0], [-0.7, 1.5, 0.0]];
+        for (material, [a, b, c, d]) in [floor, card].into_iter().enumerate() {
+            let corners: Vec<f32> = [a, b, c, a, c, d].concat();
+            let position = stage.floats("VEC3", &corners);
+            stage.push(
+                "meshes",
+                json!({"primitives": [{"attributes": {"POSITION": position}, "material": material}]}),
+            );
+        }
+        stage
+    }
+
+    /// The camera drifts to the right for `frames` frames.
+    pub fn drifting(frames: usize) -> Self {
+        let mut stage = Self::new();
+        let path: Vec<[f32; 3]> = (0..frames).map(|i| [0.05 * i as f32, 1.0, 6.0]).collect();
+        stage.translate(CAMERA, &path);
+        stage
+    }
+
+    /// Puts `node` at one place after the other, a frame each.
+    pub fn translate(&mut self, node: usize, path: &[[f32; 3]]) {
+        let times: Vec<f32> = (0..path.len()).map(|i| i as f32 / 24.0).collect();
+        let (input, output) = (self.floats("SCALAR", &times), self.floats("VEC3", &path.concat()));
+        self.push(
+            "animations",
+            json!({
+                "samplers": [{"input": input, "output": output}],
+                "channels": [{"sampler": 0, "target": {"node": node, "path": "translation"}}],
+            }),
+        );
+    }
+
+    pub fn write(&self, path: &Path) -> PathBuf {
+        let mut json = self.json.clone();
+        let data = base64::engine::general_purpose::STANDARD.encode(&self.bytes);
+        let uri = format!("data:application/octet-stream;base64,{data}");
+        json["buffers"] = json!([{"byteLength": self.bytes.len(), "uri": uri}]);
+        if json["animations"].as_array().unwrap().is_empty() {
+            json.as_object_mut().unwrap().remove("animations");
+        }
+        fs::write(path, json.to_string()).unwrap();
+        path.to_path_buf()
+    }
+
+    fn push(&mut self, array: &str, item: Value) -> usize {
+        let items = self.json[array].as_array_mut().unwrap();
+        items.push(item);
+        items.len() - 1
+    }
+
+    fn floats(&mut self, kind: &str, values: &[f32]) -> usize {
+        let width = if kind == "VEC3" { 3 } else { 1 };
+        let bytes: Vec<u8> = values.iter().flat_map(|v| v.to_le_bytes()).collect();
+        let view = json!({"buffer": 0, "byteOffset": self.bytes.len(), "byteLength": bytes.len()});
+        self.bytes.extend(bytes);
+        let view = self.push("bufferViews", view);
+        let count = values.len() / width;
+        // A POSITION accessor must have bounds; any will do for a time.
+        let bound = |pick: fn(f32, f32) -> f32| -> Vec<f32> {
+            (0..width).map(|c| values.iter().skip(c).step_by(width).copied().reduce(pick).unwrap()).collect()
+        };
+        let accessor = json!({"bufferView": view, "type": kind, "componentType": 5126, "count": count, "min": bound(f32::min), "max": bound(f32::max)});
+        self.push("accessors", accessor)
+    }
+}
