@@ -1,6 +1,4 @@
-//! The command line: arguments as typed, the job as meant, progress, messages. Only here is anything printed.
-
-#![allow(clippy::print_stdout, clippy::print_stderr)]
+//! The command line: arguments as typed, the job as meant, progress, messages. Only here, by [`say`], is anything printed.
 
 mod args;
 mod compare;
