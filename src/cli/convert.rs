@@ -49,7 +49,7 @@ pub fn run(args: ConvertArgs) -> Result<ExitCode> {
             "warning: {path}: the file system has no locks: do not run twice on the same frames"
         ));
     }
-    let skipped = existing(&folder, &frames, &hash, &args)?;
+    let skipped = existing(&folder, &frames, &hash, &args, &interrupt)?;
     let to_render: BTreeSet<i64> =
         frames.difference(&skipped.iter().map(|r| r.number).collect()).copied().collect();
 
@@ -158,9 +158,14 @@ fn existing(
     frames: &BTreeSet<i64>,
     hash: &SettingsHash,
     args: &ConvertArgs,
+    interrupt: &Interrupt,
 ) -> Result<Vec<FrameRecord>> {
     let mut kept = Vec::new();
     for &number in frames {
+        // Each file is read in full: thousands of them take their time.
+        if let Some(signal) = interrupt.stop_requested() {
+            return Err(Error::Interrupted { signal }.into());
+        }
         if args.output.skip_existing {
             if let FrameFile::Complete(stats, kind) = folder.check(number, hash) {
                 kept.push(FrameRecord { number, kind, stats, skipped: true });

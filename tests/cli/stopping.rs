@@ -77,3 +77,19 @@ fn two_runs_cannot_write_the_same_frames() {
     assert_eq!(leftovers(&out), [""; 0]);
     assert_eq!(frames_in(&out), ["courtyard.0008.exr", "courtyard.0020.exr", "other.0008.exr"]);
 }
+
+#[test]
+fn a_folder_that_vanishes_ends_the_run_with_4() {
+    let (folder, out) = fresh();
+    let running = Running::start(&courtyard(), &out, &format!("{SMALL} -j 1 --progress none"));
+    wait_for("frames", || frames_in(&out).len() >= 2);
+    let away = folder.path().join("away");
+    std::fs::rename(&out, &away).unwrap();
+    running.end().refused(4, &["courtyard.", "folder"]);
+    assert!(!out.exists());
+    // Put back, it is taken up again, whatever is left of the run that lost it.
+    std::fs::rename(&away, &out).unwrap();
+    run(&courtyard(), &out, &format!("{SMALL} -f 0-15 --skip-existing")).ok();
+    assert_same_bytes(&out, reference());
+    assert_eq!(leftovers(&out), [""; 0]);
+}
