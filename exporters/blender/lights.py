@@ -109,6 +109,8 @@ def _values(data: bpy.types.Light, scale: np.ndarray) -> dict[str, float]:
     colour, power = colour / peak, power * peak
     out = dict(zip("rgb", map(float, colour), strict=True))
     if data.type == "SUN":
+        if not getattr(data, "normalize", True):
+            power *= math.pi * math.sin(data.angle / 2) ** 2
         return out | {"intensity": max(LUMENS_PER_WATT * power, 0), "angle": min(data.angle, math.pi)}
     if data.type == "AREA":
         width = data.size * scale[0]

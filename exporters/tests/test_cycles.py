@@ -162,3 +162,38 @@ def test_pictures_line_up(blender, export, buzz, tmp_path, case):
     cycles = r.cycles_render(blender, tmp_path / "cycles.exr", frame)
     assert ours["objectId.id"].shape == cycles["index"].shape
     assert r.mask_difference(ours["objectId.id"], cycles["index"]) < 0.003
+
+
+@pytest.mark.parametrize(
+    ("kind", "settings"),
+    [
+        ("POINT", {"energy": 10.0, "shadow_soft_size": 0.2}),
+        ("SPOT", {"energy": 10.0, "shadow_soft_size": 0.2, "spot_size": 3.1}),
+        ("SUN", {"energy": 10.0, "angle": 0.1}),
+        ("AREA", {"energy": 10.0, "shape": "RECTANGLE", "size": 0.5, "size_y": 0.4}),
+        ("AREA", {"energy": 10.0, "shape": "DISK", "size": 0.5}),
+    ],
+)
+@pytest.mark.parametrize("changed", [{"normalize": False}, {"exposure": 1.5}])
+def test_light_settings_scale_as_in_cycles(blender, export, tmp_path, kind, settings, changed):
+    """What a setting does to the brightness in Cycles, it does to the intensity in the file."""
+    import blender_scene as b
+    import render_tools as r
+
+    scene = blender.context.scene
+    scene.render.resolution_x = scene.render.resolution_y = 5
+    scene.frame_end = 1
+    b.camera(location=(0, 0, 9), rotation=(0, 0, 0), lens=100.0)
+    b.plane("Floor", 40).data.materials.append(b.material()[0])
+    lamp = b.light(kind, location=(0, 3, 6), **settings)
+    if not hasattr(lamp.data, next(iter(changed))):
+        pytest.skip(f"this Blender's lights have no {next(iter(changed))}")
+    r.cycles_settings(blender)
+    scene.cycles.samples = 64
+    seen, written = [], []
+    for values in ({}, changed):
+        for key, value in values.items():
+            setattr(lamp.data, key, value)
+        seen.append(r.cycles_render(blender, tmp_path / "cycles.exr")["R"].mean())
+        written.append(export().light("Light")[1]["intensity"])
+    assert written[1] / written[0] == pytest.approx(seen[1] / seen[0], rel=0.01)

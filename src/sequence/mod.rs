@@ -74,6 +74,9 @@ pub struct Settings {
     pub audit: bool,
     /// The camera to use throughout, instead of the scene's cuts.
     pub camera: Option<usize>,
+    /// Cast each camera ray at random inside its pixel, by this seed, instead of through the centre. A full trace made so
+    /// has the half-pixel guarantee's own error: what inferred frames are measured against.
+    pub jitter: Option<u64>,
 }
 
 impl Settings {
@@ -89,6 +92,7 @@ impl Settings {
             bounces: 4,
             audit: false,
             camera: None,
+            jitter: None,
         }
     }
 }
@@ -204,7 +208,8 @@ fn render_segment(
     let key_shot = shot(scene, settings, segment.key);
     let start = Instant::now();
     key.forget(PixelClass::Traced);
-    let rays = key.cast_unknown(&Projector::new(&key_shot.view, origin), &emitter.caster(&key_shot.view));
+    let rays = key
+        .cast_unknown(&Projector::new(&key_shot.view, origin), &emitter.caster(&key_shot.view, segment.key));
     let mut stats = FrameStats { rays, ..FrameStats::default() };
     stats.seconds.trace = start.elapsed().as_secs_f64();
     emitter.emit(segment.key, FrameKind::Traced, &key_shot, key, stats)?;
@@ -218,7 +223,7 @@ fn render_segment(
             let to = shot(scene, settings, number);
             let source = if i == 0 { &*key } else { &*old };
             let start = Instant::now();
-            let caster = emitter.caster(&to.view);
+            let caster = emitter.caster(&to.view, number);
             let cost = inference.infer((source, &from.view), (new, &to.view), origin, &caster);
             let mut stats = FrameStats { rays: cost.rays, ..FrameStats::default() };
             stats.seconds.trace = cost.tracing.as_secs_f64();
@@ -251,6 +256,8 @@ struct Caster<'a> {
     tracer: &'a Tracer<'a>,
     view: &'a View,
     observer: &'a dyn Observer,
+    /// See [`Settings::jitter`]; differs from frame to frame.
+    jitter: Option<u64>,
 }
 
 impl CastRays for Caster<'_> {
@@ -259,8 +266,20 @@ impl CastRays for Caster<'_> {
     }
 
     fn cast(&self, x: usize, y: usize, lit: &mut [u32], counts: &mut RayCounts) -> SurfaceSample {
-        self.tracer.cast(self.view, x as f64 + 0.5, y as f64 + 0.5, lit, counts)
+        let offset = self.jitter.map_or([0.5; 2], |seed| {
+            let bits = mix(seed ^ ((y as u64) << 32 | x as u64));
+            [bits as u32, (bits >> 32) as u32].map(|b| f64::from(b) / (f64::from(u32::MAX) + 1.0))
+        });
+        self.tracer.cast(self.view, x as f64 + offset[0], y as f64 + offset[1], lit, counts)
     }
+}
+
+/// Scatters the bits of a number (SplitMix64's finaliser).
+fn mix(n: u64) -> u64 {
+    let n = n.wrapping_add(0x9e37_79b9_7f4a_7c15);
+    let n = (n ^ n >> 30).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+    let n = (n ^ n >> 27).wrapping_mul(0x94d0_49bb_1331_11eb);
+    n ^ n >> 31
 }
 
 /// Turns samples into frames and hands them over.
@@ -277,8 +296,9 @@ struct Emitter<'a> {
 }
 
 impl Emitter<'_> {
-    fn caster<'a>(&'a self, view: &'a View) -> Caster<'a> {
-        Caster { tracer: self.tracer, view, observer: &*self.observer }
+    fn caster<'a>(&'a self, view: &'a View, frame: i64) -> Caster<'a> {
+        let jitter = self.settings.jitter.map(|seed| mix(seed ^ frame as u64));
+        Caster { tracer: self.tracer, view, observer: &*self.observer, jitter }
     }
 
     /// Finishes a frame, unless the user asked to stop: then its samples may be missing, and it is dropped.
