@@ -102,34 +102,36 @@ fn of_two_samples_on_a_pixel_the_nearest_wins_in_either_order() {
     }
 }
 
-#[test]
-fn what_an_old_hit_may_hide_clears_what_is_behind_it() {
-    // A post at depth 1 stands before a wall at depth 10. The eye steps half a unit to the right: the post moves half a
-    // pixel and uncovers wall; the line behind it passes before the wall's samples next to it.
-    let mut row: Vec<_> = (0..5).map(|i| point((f64::from(i) - 2.0) * 10.0, 10.0, 1)).collect();
-    row[2] = point(0.4, 1.0, 2);
-    let (new, _) = infer(&row, &five(0.0), &five(1.0));
-    // The post lands on pixel 1; its line runs from there to where infinity lies, pixel 2; the wall landed there at
-    // depth 10 from old pixel 2 only if the post had not hidden it.
-    assert_eq!(new.object[1], 2);
-    assert_ne!(new.class[2], Good, "nothing known may fill what the post hid");
+/// A post at x = 0, depth 1, and the eye steps two units to the right. The post lands on pixel 0; the line L behind it
+/// appears at 2.5 - 2 / z, so in pixel 1 its depth runs from 4/3 to 4: int_z is 4.
+fn behind_a_post(sample: SurfaceSample) -> (PixelClass, u32) {
+    let mut row: Vec<_> = (0..5).map(|i| point((f64::from(i) - 2.0) * 10.0 + 2.0, 10.0, 1)).collect();
+    row[1] = sample;
+    row[2] = point(0.0, 1.0, 2);
+    let (new, _) = infer(&row, &five(0.0), &five(2.0));
+    assert_eq!(new.object[0], 2, "the post is where it should be");
+    (new.class[1], new.object[1])
 }
 
 #[test]
-fn a_line_kills_only_what_lies_behind_its_far_end_in_the_pixel() {
-    // The post's line crosses pixel 1 between depths 1 and about 3 only; a sample at depth 2.5 there may stand before
-    // what is hidden, one at depth 50 may not.
-    let survives = |depth: f64| {
-        let mut row: Vec<_> = (0..5).map(|i| point((f64::from(i) - 2.0) * 1e5, 1e5, 1)).collect();
-        row[3] = point(1.0, 1.0, 2);
-        // Stays on pixel 1 when the eye steps three units to the right.
-        row[4] = point(3.0 - depth * 0.9, depth, 3);
-        let from = five(0.0);
-        let (new, _) = infer(&row, &from, &five(3.0));
-        (new.class, new.object)
-    };
-    let (class, _) = survives(1e4);
-    assert!(class.contains(&Bad), "{class:?}");
+fn what_an_old_hit_may_hide_clears_what_is_behind_it() {
+    // Lands on the middle of pixel 1, at depth 10: behind int_z.
+    assert_eq!(behind_a_post(point(-8.0, 10.0, 3)), (Bad, 99));
+}
+
+#[test]
+fn a_line_clears_only_what_lies_behind_its_far_end_in_the_pixel() {
+    // Lands on pixel 1 at depth 3: L leaves the pixel at depth 4, so it may pass behind this sample.
+    assert_eq!(behind_a_post(point(-1.9, 3.0, 3)), (Good, 3));
+}
+
+#[test]
+fn what_was_hidden_is_traced_where_nothing_known_shows_it() {
+    let mut row: Vec<_> = (0..5).map(|i| point((f64::from(i) - 2.0) * 10.0 + 2.0, 10.0, 1)).collect();
+    row[2] = point(0.0, 1.0, 2);
+    let (new, _) = infer(&row, &five(0.0), &five(1.0));
+    // The post moves from pixel 2 to pixel 1; the wall behind it was never seen.
+    assert_eq!((new.object[1], new.object[2], new.class[2]), (2, 99, Missed));
 }
 
 #[test]
