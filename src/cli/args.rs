@@ -156,7 +156,7 @@ pub struct OutputArgs {
     /// Compression of the EXR files.
     #[arg(long, value_enum, default_value = "zip")]
     pub compression: CompressionArg,
-    /// File names: %04d or #### stands for the frame number [default: <stem>.%04d.exr].
+    /// File names, with %04d or #### for the frame number; `<stem>.%04d.exr` if not given.
     #[arg(long, value_name = "PATTERN")]
     pub name: Option<String>,
     /// Keep the frames that are there and complete; render the others.

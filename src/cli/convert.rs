@@ -270,7 +270,7 @@ fn summary(report: &Report) -> String {
         totals.traced_frames,
         totals.inferred_frames,
         s.wall,
-        saved.unwrap_or_else(|| "no frame was traced in this run".into()),
+        saved.unwrap_or_else(|| "no key frame among these frames to measure the saving against".into()),
         s.import,
         s.accel,
         s.plan,

@@ -10,7 +10,7 @@ pub const UNKNOWN: u32 = u32::MAX;
 
 /// One sample a pixel, as structure of arrays, rows from the top.
 ///
-/// State: 56 bytes a pixel and 4 more for each 32 lights, of which 1 is the class.
+/// State: 53 bytes a pixel, and 4 more for each 32 lights.
 #[derive(Debug, Clone, Default)]
 pub struct BuzzBuffer {
     width: usize,
