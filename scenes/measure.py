@@ -2,7 +2,7 @@
 """Makes the table of README.md: renders this folder's scenes in full and inferred, and compares the two.
 
     cargo build --release
-    python3 scenes/measure.py OUT [--rounds 3] [scene ...]
+    python3 scenes/measure.py OUT [scene ...] [--rounds 3]
 
 Each round renders a scene with `-q full`, then with `-q half-pixel`, so that whatever else the machine does meets both
 alike; times are those of the round with the median ratio. CPU seconds say what was worked, whoever else had the
