@@ -38,7 +38,6 @@ fn point(x: f64, z: f64, object: u32) -> SurfaceSample {
         surface: SurfaceRef { instance: object, primitive: 0, u: 0.25, v: 0.5 },
         object,
         normal: PackedNormal::new(Vec3::Z),
-        irradiance: Vec3::splat(object as f32),
     }
 }
 
@@ -223,7 +222,6 @@ impl Spheres {
             surface: SurfaceRef { instance: best.1, primitive: 0, u: 0.0, v: 0.0 },
             object: best.1,
             normal: PackedNormal::new(best.2.as_vec3()),
-            irradiance: Vec3::splat(best.1 as f32),
         }
     }
 }

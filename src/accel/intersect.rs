@@ -73,6 +73,31 @@ impl Accel {
         })
     }
 
+    /// Where a ray meets one known triangle, if it does with `t_min <= t <= t_max`, holes cut by alpha considered: its
+    /// parameter and the point. Which side it meets does not matter; nothing else is looked at.
+    pub fn meet(
+        &self,
+        scene: &Scene,
+        origin: Vec3,
+        direction: Vec3,
+        t_min: f32,
+        t_max: f32,
+        surface: SurfaceRef,
+    ) -> Option<(f32, SurfaceRef)> {
+        let index = surface.instance as usize;
+        let mesh = &scene.meshes[scene.instances[index].mesh];
+        let positions = self.positions(index, mesh);
+        let m = &self.placement(index).render_from_object;
+        let corners = mesh.triangles[surface.primitive as usize]
+            .map(|i| Vec3::from(m.transform_point3a(positions[i as usize].into())));
+        let triangle = TreeTriangle::new(corners, surface.primitive, 0, 0);
+        let hit = ShearedRay::new(origin, direction).intersect(&triangle, t_min, t_max)?;
+        let flags = opacity::flags(scene, mesh);
+        let present =
+            flags & EYE_TEST == 0 || opacity::is_present_at(scene, mesh, surface.primitive, hit.u, hit.v);
+        present.then_some((hit.t, SurfaceRef { u: hit.u, v: hit.v, ..surface }))
+    }
+
     /// True if light passes from `from` along `direction` as far as `t_max` lengths of it: nothing there has an
     /// opacity, alpha x (1 - transmission), of one half or more. Both sides of every surface block it.
     pub fn unoccluded(&self, scene: &Scene, from: Vec3, direction: Vec3, t_max: f32) -> bool {

@@ -28,8 +28,9 @@ impl SurfaceRef {
     }
 }
 
-/// What a ray through a pixel found that does not depend on the eye (the paper's intersection point, normal, diffuse
-/// colour, id_tag). The shadow bits stand beside it, one bit for each light, in words of 32.
+/// What a ray through a pixel found that does not depend on the eye (the paper's intersection point, normal, id_tag).
+/// The shadow bits stand beside it, one bit for each light, in words of 32. The paper's diffuse colour is not stored: it
+/// follows from the bits, and shading goes through the lights that they name anyway, for the highlights.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SurfaceSample {
     /// Hit relative to the segment's origin, metres, world axes. For the background: the unit direction.
@@ -40,8 +41,6 @@ pub struct SurfaceSample {
     pub object: u32,
     /// Geometric normal, turned to the side from which it was seen.
     pub normal: PackedNormal,
-    /// Light that arrives, W/m2: every light that reaches the point (Lambert's cosine included) and the world's.
-    pub irradiance: Vec3,
 }
 
 impl SurfaceSample {
@@ -52,7 +51,6 @@ impl SurfaceSample {
             surface: SurfaceRef::BACKGROUND,
             object: 0,
             normal: PackedNormal::default(),
-            irradiance: Vec3::ZERO,
         }
     }
 }

@@ -10,7 +10,7 @@ pub const UNKNOWN: u32 = u32::MAX;
 
 /// One sample a pixel, as structure of arrays, rows from the top.
 ///
-/// State: 53 bytes a pixel, and 4 more for each 32 lights.
+/// State: 41 bytes a pixel, and 4 more for each 32 lights.
 #[derive(Debug, Clone, Default)]
 pub struct BuzzBuffer {
     width: usize,
@@ -26,8 +26,6 @@ pub struct BuzzBuffer {
     pub surface: Vec<SurfaceRef>,
     /// See [`SurfaceSample::normal`].
     pub normal: Vec<PackedNormal>,
-    /// See [`SurfaceSample::irradiance`].
-    pub irradiance: Vec<Vec3>,
     /// Shadow bits, `lit_words` for each pixel: set where the light reaches the point.
     pub lit: Vec<u32>,
     /// How each pixel was obtained.
@@ -47,7 +45,6 @@ impl BuzzBuffer {
             object: vec![UNKNOWN; n],
             surface: vec![SurfaceRef::BACKGROUND; n],
             normal: vec![PackedNormal::default(); n],
-            irradiance: vec![Vec3::ZERO; n],
             lit: vec![0; n * lit_words],
             class: vec![PixelClass::Traced; n],
         }
@@ -56,7 +53,7 @@ impl BuzzBuffer {
     /// Bytes that a pixel of a buffer for `lights` lights takes.
     pub fn bytes_per_pixel(lights: usize) -> usize {
         size_of::<f32>()
-            + 2 * size_of::<Vec3>()
+            + size_of::<Vec3>()
             + size_of::<u32>()
             + size_of::<SurfaceRef>()
             + size_of::<PackedNormal>()
@@ -86,7 +83,6 @@ impl BuzzBuffer {
             surface: self.surface[i],
             object: self.object[i],
             normal: self.normal[i],
-            irradiance: self.irradiance[i],
         }
     }
 
@@ -128,7 +124,6 @@ impl BuzzBuffer {
                 row.object[x] = sample.object;
                 row.surface[x] = sample.surface;
                 row.normal[x] = sample.normal;
-                row.irradiance[x] = sample.irradiance;
             }
             counts
         };
@@ -150,18 +145,16 @@ impl BuzzBuffer {
             self.object.par_chunks_mut(w),
             self.surface.par_chunks_mut(w),
             self.normal.par_chunks_mut(w),
-            self.irradiance.par_chunks_mut(w),
             self.lit.par_chunks_mut(lit_row),
             self.class.par_chunks_mut(w),
         )
             .into_par_iter()
-            .map(move |(z, position, object, surface, normal, irradiance, lit, class)| Row {
+            .map(move |(z, position, object, surface, normal, lit, class)| Row {
                 z,
                 position,
                 object,
                 surface,
                 normal,
-                irradiance,
                 lit,
                 class,
                 lit_words,
@@ -176,7 +169,6 @@ pub(super) struct Row<'a> {
     pub object: &'a mut [u32],
     pub surface: &'a mut [SurfaceRef],
     pub normal: &'a mut [PackedNormal],
-    pub irradiance: &'a mut [Vec3],
     pub lit: &'a mut [u32],
     pub class: &'a mut [PixelClass],
     pub lit_words: usize,

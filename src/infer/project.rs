@@ -84,7 +84,6 @@ pub fn gather(old: &BuzzBuffer, landings: &Landings, marks: &Marks, new: &mut Bu
             row.object[x] = old.object[i];
             row.surface[x] = old.surface[i];
             row.normal[x] = old.normal[i];
-            row.irradiance[x] = old.irradiance[i];
             row.lit[x * row.lit_words..][..row.lit_words].copy_from_slice(old.lit(i));
         }
     });

@@ -1,15 +1,16 @@
 //! Tracing as Whitted did: one ray through a pixel, one shadow ray to each light, mirrored and refracted rays on from
 //! there. `docs/shading.md` has the model, its formulas and its cut-offs.
 //!
-//! The work is split as the paper splits it. [`Tracer::cast`] finds what does not depend on the eye: the point, and the
-//! light that arrives there. [`Tracer::shade`] adds what does (the paper's *enhancement*): the texture under the
-//! pixel's beam, highlights, reflection, refraction. It is a function of the view, the sample and its shadow bits
-//! alone, whether the sample was just cast or carried over from another frame: so a still camera gives the same
-//! values frame after frame.
+//! The work is split as the paper splits it. [`Tracer::cast`] finds what does not depend on the eye and takes rays to
+//! know: the point, and which lights reach it. [`Tracer::shade`] adds the rest (the paper's *enhancement*): the light that
+//! arrives, the texture under the pixel's beam, highlights, reflection, refraction. It is a function of the view, the
+//! sample and its shadow bits alone, whether the sample was just cast or carried over from another frame: so a still
+//! camera gives the same values frame after frame.
 
 mod ggx;
 mod interaction;
 mod light;
+mod point;
 mod surface;
 mod whitted;
 mod world;
@@ -18,8 +19,9 @@ use crate::accel::{Accel, Sides};
 use crate::frame::{PackedNormal, RayCounts, SurfaceSample};
 use crate::scene::{Pose, Scene, View};
 use glam::Vec3;
-use interaction::{Beam, Side, SurfaceInteraction};
+use interaction::{Beam, SurfaceInteraction};
 use light::{Arriving, Emitter};
+use point::{Side, SurfacePoint};
 use std::f32::consts::FRAC_1_PI;
 use surface::{Surface, occlusion};
 use whitted::Path;
@@ -70,6 +72,14 @@ pub struct Tracer<'a> {
     world: Surroundings<'a>,
 }
 
+/// A camera ray in render space, and the part of it that the view shows.
+struct Ray {
+    origin: Vec3,
+    direction: Vec3,
+    near: f32,
+    far: f32,
+}
+
 /// The eye of a view in render space.
 #[derive(Clone, Copy)]
 struct Eye {
@@ -110,44 +120,106 @@ impl<'a> Tracer<'a> {
     /// The ray starts at the view's near plane and ends at its far plane. Counts `primary` and `shadow`.
     pub fn cast(&self, view: &View, x: f64, y: f64, lit: &mut [u32], rays: &mut RayCounts) -> SurfaceSample {
         lit.fill(0);
-        rays.primary += 1;
-        let ray = view.ray(x, y);
-        let origin = (ray.origin - self.accel.origin()).as_vec3();
-        let direction = ray.direction.as_vec3();
-        let (near, far) = (view.lens.near.max(0.0) as f32, view.lens.far as f32);
-        let Some(hit) = self.accel.intersect(self.scene, origin, direction, near, far, Sides::Visible) else {
-            return SurfaceSample::background(direction.normalize_or(Vec3::NEG_Z));
-        };
-        let eye = self.eye(view);
-        // The beam at the point itself, as `shade` will have it.
-        let (toward, beam) = eye.seen_from(self.accel.surface_point(self.scene, hit.surface));
-        let it = SurfaceInteraction::new(
-            self.scene,
-            self.accel,
-            hit.surface,
-            Side::Front(hit.front),
-            toward,
-            beam,
-        );
-        let mut irradiance = Vec3::ZERO;
-        if !it.material.unlit {
-            irradiance = self.ambient(&it);
-            for (i, light) in self.lights.iter().enumerate() {
-                if let Some(arriving) = self.facing(&it, light) {
-                    rays.shadow += 1;
-                    if self.reaches(&it, &arriving) {
-                        irradiance += arriving.irradiance;
-                        lit[i / 32] |= 1 << (i % 32);
-                    }
-                }
+        let (sample, point) = self.first_hit(view, x, y, rays);
+        if let Some(point) = point {
+            self.look_for_lights(&point, |_| true, lit, rays);
+        }
+        sample
+    }
+
+    /// Casts a ray from the eye through raster position (x, y), and none to the lights. Counts `primary`.
+    pub fn hit(&self, view: &View, x: f64, y: f64, rays: &mut RayCounts) -> SurfaceSample {
+        self.first_hit(view, x, y, rays).0
+    }
+
+    /// Finds out anew whether the lights whose bits are set in `ask` reach a sample, and sets or clears their bits in
+    /// `lit`. Counts `shadow`.
+    pub fn recast(&self, sample: &SurfaceSample, ask: &[u32], lit: &mut [u32], rays: &mut RayCounts) {
+        if !sample.surface.is_background() {
+            let side = Side::Towards(sample.normal.get());
+            let point = SurfacePoint::new(self.scene, self.accel, sample.surface, side);
+            self.look_for_lights(&point, |light| is_lit(ask, light), lit, rays);
+        }
+    }
+
+    /// What the ray through raster position (x, y) meets first if it can meet nothing but the triangles of
+    /// `candidates`; no ray is cast into the scene, and none is counted. Where the candidates are the background, that.
+    pub fn nearest_of(
+        &self,
+        view: &View,
+        x: f64,
+        y: f64,
+        candidates: impl Iterator<Item = SurfaceSample>,
+    ) -> Option<SurfaceSample> {
+        let ray = self.ray(view, x, y);
+        let mut nearest: Option<(f32, SurfaceSample)> = None;
+        for candidate in candidates {
+            if candidate.surface.is_background() {
+                return Some(SurfaceSample::background(ray.direction.normalize_or(Vec3::NEG_Z)));
+            }
+            let t_max = nearest.map_or(ray.far, |n| n.0);
+            let hit =
+                self.accel.meet(self.scene, ray.origin, ray.direction, ray.near, t_max, candidate.surface);
+            if let Some((t, surface)) = hit {
+                let position = self.accel.surface_point(self.scene, surface);
+                nearest = Some((t, SurfaceSample { position, surface, ..candidate }));
             }
         }
-        SurfaceSample {
-            position: it.position,
+        nearest.map(|n| n.1)
+    }
+
+    /// The first thing on the ray through raster position (x, y): a surface's sample and the point it lies on, or the
+    /// background's.
+    fn first_hit(
+        &self,
+        view: &View,
+        x: f64,
+        y: f64,
+        rays: &mut RayCounts,
+    ) -> (SurfaceSample, Option<SurfacePoint<'a>>) {
+        rays.primary += 1;
+        let Ray { origin, direction, near, far } = self.ray(view, x, y);
+        let Some(hit) = self.accel.intersect(self.scene, origin, direction, near, far, Sides::Visible) else {
+            return (SurfaceSample::background(direction.normalize_or(Vec3::NEG_Z)), None);
+        };
+        let point = SurfacePoint::new(self.scene, self.accel, hit.surface, Side::Front(hit.front));
+        let sample = SurfaceSample {
+            position: point.position,
             surface: hit.surface,
             object: self.scene.instances[hit.surface.instance as usize].object,
-            normal: PackedNormal::new(it.geometric),
-            irradiance: finite(irradiance),
+            normal: PackedNormal::new(point.geometric),
+        };
+        (sample, Some(point))
+    }
+
+    fn ray(&self, view: &View, x: f64, y: f64) -> Ray {
+        let ray = view.ray(x, y);
+        Ray {
+            origin: (ray.origin - self.accel.origin()).as_vec3(),
+            direction: ray.direction.as_vec3(),
+            near: view.lens.near.max(0.0) as f32,
+            far: view.lens.far as f32,
+        }
+    }
+
+    /// Casts a ray to each light that is `asked` for and could shine on the point: in range, within its cone, and in
+    /// front of the surface itself. Whether a bumped or smoothed normal faces it does not matter here: what reaches the
+    /// point must not depend on what textures say under one eye's beam.
+    fn look_for_lights(
+        &self,
+        point: &SurfacePoint,
+        asked: impl Fn(usize) -> bool,
+        lit: &mut [u32],
+        rays: &mut RayCounts,
+    ) {
+        for (i, light) in self.lights.iter().enumerate().filter(|(i, _)| asked(*i)) {
+            let (word, bit) = (i / 32, 1 << (i % 32));
+            lit[word] &= !bit;
+            let arriving = light.arriving(point.position).filter(|a| point.geometric.dot(a.to_light) > 0.0);
+            if let Some(arriving) = arriving.filter(|_| !point.material.unlit) {
+                rays.shadow += 1;
+                lit[word] |= if self.reaches(point, &arriving) { bit } else { 0 };
+            }
         }
     }
 
@@ -163,16 +235,20 @@ impl<'a> Tracer<'a> {
         let (toward, beam) = eye.seen_from(sample.position);
         let it = self.interaction(sample, toward, beam);
         let surface = Surface::new(&it);
-        let mut highlights = Vec3::ZERO;
-        for (i, light) in self.lights.iter().enumerate() {
-            if is_lit(lit, i)
-                && let Some(arriving) = self.facing(&it, light)
-            {
-                highlights += surface.highlight(&it, toward, &arriving);
+        let (mut irradiance, mut highlights) = (Vec3::ZERO, Vec3::ZERO);
+        if !it.point.material.unlit {
+            irradiance = self.ambient(&it);
+            for (i, light) in self.lights.iter().enumerate() {
+                if is_lit(lit, i)
+                    && let Some(arriving) = self.facing(&it, light)
+                {
+                    irradiance += arriving.irradiance;
+                    highlights += surface.highlight(&it, toward, &arriving);
+                }
             }
         }
         let path = Path::new(beam);
-        let seen = self.leaving(&it, &surface, toward, sample.irradiance, highlights, &path, rays);
+        let seen = self.leaving(&it, &surface, toward, irradiance, highlights, &path, rays);
         Radiance {
             diffuse: finite(seen.diffuse),
             specular: finite(seen.specular),
@@ -244,9 +320,9 @@ impl<'a> Tracer<'a> {
 
     /// What arrives from a light that is in front of the surface, Lambert's cosine included.
     fn facing(&self, it: &SurfaceInteraction, light: &Emitter) -> Option<Arriving> {
-        let mut arriving = light.arriving(it.position)?;
+        let mut arriving = light.arriving(it.point.position)?;
         let cos = it.normal.dot(arriving.to_light);
-        if cos <= 0.0 || it.geometric.dot(arriving.to_light) <= 0.0 {
+        if cos <= 0.0 || it.point.geometric.dot(arriving.to_light) <= 0.0 {
             return None;
         }
         arriving.irradiance *= cos;
@@ -254,8 +330,8 @@ impl<'a> Tracer<'a> {
     }
 
     /// Whether nothing stands in the light's way. Stops a little before the light, which may itself stand on a surface.
-    fn reaches(&self, it: &SurfaceInteraction, arriving: &Arriving) -> bool {
-        let from = it.start(arriving.to_light);
+    fn reaches(&self, point: &SurfacePoint, arriving: &Arriving) -> bool {
+        let from = point.start(arriving.to_light);
         self.accel.unoccluded(self.scene, from, arriving.to_light, arriving.distance * (1.0 - 1e-4))
     }
 

@@ -30,7 +30,7 @@ pub(super) struct Surface {
 
 impl Surface {
     pub fn new(it: &SurfaceInteraction) -> Self {
-        let material = it.material;
+        let material = it.point.material;
         let texture = |t: &Option<TextureRef>| t.as_ref().map_or(Vec4::ONE, |t| it.texture(t));
         let base = material.base_color * texture(&material.base_color_texture) * it.vertex_color();
         let color = base.truncate();
@@ -71,7 +71,7 @@ impl Surface {
             f0: dielectric_f0.lerp(color, metallic),
             f90: specular + (1.0 - specular) * metallic,
             transmittance: color * ((1.0 - metallic) * transmission),
-            eta: bends.then_some(if it.front { ior } else { 1.0 / ior }),
+            eta: bends.then_some(if it.point.front { ior } else { 1.0 / ior }),
         }
     }
 
@@ -99,7 +99,7 @@ impl Surface {
 
 /// Ambient light that occlusion leaves, 0 to 1.
 pub(super) fn occlusion(it: &SurfaceInteraction) -> f32 {
-    let Material { occlusion_texture, .. } = it.material;
+    let Material { occlusion_texture, .. } = it.point.material;
     occlusion_texture
         .as_ref()
         .map_or(1.0, |(texture, strength)| 1.0 + strength * (it.texture(texture).x - 1.0))

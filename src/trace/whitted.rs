@@ -1,8 +1,9 @@
 //! What leaves a surface towards the eye, and the rays that have to be followed to know it.
 
 use super::ggx::{environment_share, lobe, refract};
-use super::interaction::{Beam, Side, SurfaceInteraction};
+use super::interaction::{Beam, SurfaceInteraction};
 use super::light::Arriving;
+use super::point::Side;
 use super::surface::{Surface, occlusion};
 use super::{Radiance, Tracer};
 use crate::accel::Sides;
@@ -127,11 +128,11 @@ impl Tracer<'_> {
         let cos = it.normal.dot(toward).clamp(0.0, 1.0);
         let sharp = surface.mirror();
         let mut direction = it.normal * (2.0 * it.normal.dot(toward)) - toward;
-        let below = direction.dot(it.geometric);
+        let below = direction.dot(it.point.geometric);
         if below < 0.0 {
-            direction -= it.geometric * (2.0 * below);
+            direction -= it.point.geometric * (2.0 * below);
         }
-        let direction = direction.normalize_or(it.geometric);
+        let direction = direction.normalize_or(it.point.geometric);
         let mut light = Vec3::ZERO;
         if sharp > 0.0 {
             let share = surface.fresnel(cos) * sharp;
@@ -163,10 +164,10 @@ impl Tracer<'_> {
         if (path.share * share * coverage).max_element() <= MIN_SHARE {
             return Vec3::ZERO;
         }
-        let (direction, inside) = match (surface.eta, it.material.volume) {
+        let (direction, inside) = match (surface.eta, it.point.material.volume) {
             (Some(eta), Some(volume)) => {
                 let Some(direction) = refract(-toward, it.normal, eta) else { return Vec3::ZERO };
-                (direction, if it.front { absorption(&volume) } else { Vec3::ZERO })
+                (direction, if it.point.front { absorption(&volume) } else { Vec3::ZERO })
             }
             _ => (-toward, path.inside),
         };
@@ -185,7 +186,7 @@ impl Tracer<'_> {
         if path.bounces >= self.options.bounces {
             return self.world.radiance(direction, path.beam.spread);
         }
-        self.trace(it.start(direction), direction, next, rays)
+        self.trace(it.point.start(direction), direction, next, rays)
     }
 
     /// What comes along a secondary ray.
@@ -206,12 +207,12 @@ impl Tracer<'_> {
         let it = SurfaceInteraction::new(self.scene, self.accel, hit.surface, side, -direction, path.beam);
         let surface = Surface::new(&it);
         let (mut irradiance, mut highlights) = (Vec3::ZERO, Vec3::ZERO);
-        if !it.material.unlit {
+        if !it.point.material.unlit {
             irradiance = self.ambient(&it);
             for light in &self.lights {
                 if let Some(arriving) = self.facing(&it, light) {
                     path.count(rays);
-                    if self.reaches(&it, &arriving) {
+                    if self.reaches(&it.point, &arriving) {
                         irradiance += arriving.irradiance;
                         highlights += surface.highlight(&it, -direction, &arriving);
                     }

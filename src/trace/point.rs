@@ -1,0 +1,74 @@
+//! A point on a surface: where it is and which way the surface lies, before any texture is asked.
+
+use crate::accel::{Accel, interpolate};
+use crate::frame::SurfaceRef;
+use crate::scene::{Material, Mesh, Scene};
+use glam::{Vec3, Vec3A};
+
+/// How far a ray starts from its surface, in roundings of the coordinates that the point was computed from. A point
+/// is off by about ten of them, and the tree's own transform of the ray adds as many.
+const OFFSET_ROUNDINGS: f32 = 32.0;
+
+/// A point on a surface, in render space.
+pub(super) struct SurfacePoint<'a> {
+    pub mesh: &'a Mesh,
+    pub material: &'a Material,
+    /// The triangle's corners, as vertex numbers, and their barycentric weights here.
+    pub corners: [usize; 3],
+    pub weights: [f32; 3],
+    /// The triangle's edges from its first corner.
+    pub edges: [Vec3; 2],
+    pub position: Vec3,
+    /// Unit geometric normal on the side that is seen.
+    pub geometric: Vec3,
+    /// Whether the side that is seen is the front.
+    pub front: bool,
+    /// Metres to stay away from the surface.
+    offset: f32,
+}
+
+/// Which side of a surface is looked at.
+pub(super) enum Side {
+    /// The front if true.
+    Front(bool),
+    /// The side to which this points.
+    Towards(Vec3),
+}
+
+impl<'a> SurfacePoint<'a> {
+    /// The point at `surface`, which must not be the background.
+    pub fn new(scene: &'a Scene, accel: &'a Accel, surface: SurfaceRef, side: Side) -> Self {
+        let index = surface.instance as usize;
+        let mesh = &scene.meshes[scene.instances[index].mesh];
+        let material = &scene.materials[mesh.material];
+        let placement = accel.placement(index);
+        let corners = mesh.triangles[surface.primitive as usize].map(|i| i as usize);
+        let positions = accel.positions(index, mesh);
+        let [a, b, c] = corners.map(|i| Vec3A::from(positions[i]));
+        let weights = [1.0 - surface.u - surface.v, surface.u, surface.v];
+
+        let m = &placement.render_from_object;
+        let position: Vec3 = m.transform_point3a(interpolate(a, b, c, surface)).into();
+        let edges = [b - a, c - a].map(|e| Vec3::from(m.transform_vector3a(e)));
+        let cross = edges[0].cross(edges[1]);
+        let outward = cross.normalize_or(Vec3::Y) * placement.winding;
+        let front = match side {
+            Side::Front(front) => front,
+            Side::Towards(direction) => outward.dot(direction) >= 0.0,
+        };
+        let geometric = if front { outward } else { -outward };
+
+        let magnitude = m.matrix3.abs()
+            * (a.abs() * weights[0] + b.abs() * weights[1] + c.abs() * weights[2])
+            + m.translation.abs();
+        let offset =
+            (magnitude.max_element() + placement.fused_reach) * (OFFSET_ROUNDINGS * f32::EPSILON * 0.5);
+        Self { mesh, material, corners, weights, edges, position, geometric, front, offset }
+    }
+
+    /// Where a ray in `direction` starts so that rounding does not make it meet its own surface.
+    pub fn start(&self, direction: Vec3) -> Vec3 {
+        let side = if direction.dot(self.geometric) < 0.0 { -self.offset } else { self.offset };
+        self.position + self.geometric * side
+    }
+}
