@@ -13,7 +13,7 @@ use buzz::measure::{Exposure, psnr};
 use buzz::output::MemorySink;
 use buzz::plan::{LONGEST_SEGMENT, Plan, PlanOptions, plan};
 use buzz::scene::Scene;
-use buzz::sequence::{Settings, Unwatched, camera_path, render_sequence};
+use buzz::sequence::{Quality, Settings, Unwatched, camera_path, render_sequence};
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
@@ -32,7 +32,7 @@ fn some_frames(plan: &Plan) -> BTreeSet<i64> {
 
 fn render(scene: &Scene, plan: &Plan, frames: &BTreeSet<i64>, jitter: Option<u64>) -> Vec<Frame> {
     let (width, height) = resolution();
-    let settings = Settings { jitter, ..Settings::new(width, height) };
+    let settings = Settings { jitter, quality: Quality::HalfPixel, ..Settings::new(width, height) };
     let mut sink = MemorySink::default();
     let mut accel = Accel::new(scene);
     render_sequence(scene, &mut accel, &settings, plan, frames, &mut sink, &mut Unwatched).unwrap();
@@ -55,8 +55,8 @@ fn check(file: &Path) {
     let settings = Settings::new(width, height);
     let path = camera_path(&scene, &mut Accel::new(&scene), &settings, &Unwatched).unwrap();
     let cuts: Vec<i64> = scene.cuts.iter().map(|c| c.frame).collect();
-    let make = |full| plan(&path, &cuts, PlanOptions { full, longest_segment: LONGEST_SEGMENT });
-    let (inferring, full) = (make(false), make(true));
+    let make = |quality| plan(&path, &cuts, PlanOptions { quality, longest_segment: LONGEST_SEGMENT });
+    let (inferring, full) = (make(Quality::HalfPixel), make(Quality::Full));
     let frames = some_frames(&inferring);
     let truth = render(&scene, &full, &frames, None);
     let ours = render(&scene, &inferring, &frames, None);

@@ -116,7 +116,7 @@ pub struct SceneArgs {
 #[derive(Debug, Args)]
 pub struct ImageArgs {
     /// Accuracy of the frames that are not key frames.
-    #[arg(short, long, value_enum, default_value = "half-pixel")]
+    #[arg(short, long, value_enum, default_value = "centred")]
     pub quality: QualityArg,
     /// Image size: 1920x1080, or a share of the scene's own: 50% [default: the scene's, else 1280x720].
     #[arg(short, long)]
@@ -185,6 +185,10 @@ pub enum QualityArg {
     Full,
     /// The paper's guarantee: every reused sample lies inside its pixel.
     HalfPixel,
+    /// Every sample at its pixel's centre; rays at edges of surfaces and shadows.
+    Centred,
+    /// Centred, and a ray proves every reused sample visible.
+    Verified,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]

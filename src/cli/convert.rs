@@ -60,7 +60,7 @@ pub fn run(args: ConvertArgs) -> Result<ExitCode> {
     let options = FileOptions {
         compression: compression(args.output.compression),
         fps: timing.fps,
-        quality: job.quality.name().into(),
+        quality: job.settings.quality.name().into(),
         settings_hash: hash,
     };
     let mut sink = ExrSink::new(folder, options)?;
@@ -143,7 +143,7 @@ fn settings_hash(job: &Job, args: &ConvertArgs) -> SettingsHash {
     settings.audit = false;
     hasher.feed("version", env!("CARGO_PKG_VERSION"));
     hasher.feed("settings", format!("{settings:?}"));
-    hasher.feed("quality", job.quality.name());
+    hasher.feed("quality", job.settings.quality.name());
     hasher.feed("segment", job.longest_segment.to_le_bytes());
     hasher.feed("compression", format!("{:?}", args.output.compression));
     job.scene.digest(&mut |name, bytes| {
@@ -223,7 +223,7 @@ fn report(input: &Path, job: &Job, plan: &Plan, frames: Vec<FrameRecord>, second
     Report::new(ReportInput {
         input: input.display().to_string(),
         settings: output::Settings {
-            quality: job.quality.name().into(),
+            quality: job.settings.quality.name().into(),
             width: job.settings.width,
             height: job.settings.height,
             fps: output::Settings::fps(scene.timing.fps),

@@ -16,7 +16,6 @@ use std::time::Instant;
 pub struct Job {
     pub scene: Scene,
     pub accel: Accel,
-    pub quality: Quality,
     pub longest_segment: u32,
     pub settings: Settings,
     pub threads: usize,
@@ -47,22 +46,24 @@ impl Job {
         let start = Instant::now();
         let accel = Accel::new(&scene);
         let accel_seconds = start.elapsed().as_secs_f64();
-        let quality = match image.quality {
+        settings.quality = match image.quality {
             QualityArg::Full => Quality::Full,
             QualityArg::HalfPixel => Quality::HalfPixel,
+            QualityArg::Centred => Quality::Centred,
+            QualityArg::Verified => Quality::Verified,
         };
-        Ok(Self { scene, accel, quality, longest_segment, settings, threads, import_seconds, accel_seconds })
+        Ok(Self { scene, accel, longest_segment, settings, threads, import_seconds, accel_seconds })
     }
 
     /// Plans the scene's own range.
     pub fn plan(&mut self, observer: &dyn Observer) -> Result<Plan> {
         let path = camera_path(&self.scene, &mut self.accel, &self.settings, observer)?;
-        let full = self.quality == Quality::Full;
+        let quality = self.settings.quality;
         let cuts: Vec<i64> = match self.settings.camera {
             Some(_) => Vec::new(),
             None => self.scene.cuts.iter().map(|c| c.frame).collect(),
         };
-        Ok(plan(&path, &cuts, PlanOptions { full, longest_segment: self.longest_segment }))
+        Ok(plan(&path, &cuts, PlanOptions { quality, longest_segment: self.longest_segment }))
     }
 }
 

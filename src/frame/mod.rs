@@ -2,10 +2,12 @@
 
 mod aov;
 mod class;
+mod quality;
 mod sample;
 mod stats;
 
 pub use aov::{Aov, AovSet, Frame, FrameKind, Window};
 pub use class::PixelClass;
+pub use quality::Quality;
 pub use sample::{PackedNormal, SurfaceRef, SurfaceSample};
 pub use stats::{FrameStats, RayCounts, StageSeconds};

@@ -108,7 +108,7 @@ impl BuzzBuffer {
 
     /// Casts a ray through the centre of every pixel that is unknown; if the caster is cancelled, some stay so.
     pub fn cast_unknown(&mut self, projector: &Projector, rays: &impl CastRays) -> RayCounts {
-        let cast_row = |y: usize, row: Row<'_>| {
+        let cast_row = |y: usize, mut row: Row<'_>| {
             let mut counts = RayCounts::default();
             if rays.is_cancelled() {
                 return counts;
@@ -117,13 +117,8 @@ impl BuzzBuffer {
                 if row.object[x] != UNKNOWN {
                     continue;
                 }
-                let lit = &mut row.lit[x * row.lit_words..][..row.lit_words];
-                let sample = rays.cast(x, y, lit, &mut counts);
-                row.z[x] = projector.depth(&sample);
-                row.position[x] = sample.position;
-                row.object[x] = sample.object;
-                row.surface[x] = sample.surface;
-                row.normal[x] = sample.normal;
+                let sample = rays.cast(x, y, row.lit_mut(x), &mut counts);
+                row.put(x, projector, &sample);
             }
             counts
         };
@@ -174,6 +169,32 @@ pub(super) struct Row<'a> {
     pub lit_words: usize,
 }
 
+impl Row<'_> {
+    /// The sample in column `x`.
+    pub fn sample(&self, x: usize) -> SurfaceSample {
+        SurfaceSample {
+            position: self.position[x],
+            surface: self.surface[x],
+            object: self.object[x],
+            normal: self.normal[x],
+        }
+    }
+
+    /// The shadow bits of column `x`.
+    pub fn lit_mut(&mut self, x: usize) -> &mut [u32] {
+        &mut self.lit[x * self.lit_words..][..self.lit_words]
+    }
+
+    /// Stores a sample in column `x`; its shadow bits and class are set apart.
+    pub fn put(&mut self, x: usize, view: &Projector, sample: &SurfaceSample) {
+        self.z[x] = view.depth(sample);
+        self.position[x] = sample.position;
+        self.object[x] = sample.object;
+        self.surface[x] = sample.surface;
+        self.normal[x] = sample.normal;
+    }
+}
+
 /// Whatever can find out what a pixel's centre sees: the tracer, or a test's table.
 pub trait CastRays: Sync {
     /// The sample that the ray through the centre of pixel (x, y) finds; sets `lit`, counts what it casts.
@@ -199,6 +220,8 @@ pub struct Projector {
     far: f32,
     width: f32,
     height: f32,
+    /// Side of a pixel at planar depth 1, or anywhere in parallel projection.
+    pixel: f32,
 }
 
 /// Where a sample lies in a view.
@@ -224,6 +247,7 @@ impl Projector {
             far: view.lens.far as f32,
             width: view.width as f32,
             height: view.height as f32,
+            pixel: view.pixel_size() as f32,
         }
     }
 
@@ -248,6 +272,12 @@ impl Projector {
         } else {
             (self.raster_from_world * sample.position.extend(1.0)).z
         }
+    }
+
+    /// Side of a pixel at a point's depth, metres.
+    pub(super) fn pixel_width(&self, position: Vec3) -> f32 {
+        let depth = if self.perspective { (position - self.eye).dot(self.forward).abs() } else { 1.0 };
+        self.pixel * depth
     }
 
     /// Number of the pixel that holds raster position (x, y), if it is in the window.

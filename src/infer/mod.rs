@@ -16,13 +16,17 @@
 //! | test_z | in [`creeping()`] |
 //! | P, k | [`entering()`] |
 
+mod around;
 mod buzz_buffer;
+mod centre;
 mod creeping;
 mod entering;
 mod obscured;
 mod project;
 
+pub use around::Trust;
 pub use buzz_buffer::{BuzzBuffer, CastRays, Projected, Projector, UNKNOWN};
+pub use centre::{CastCentres, Centring};
 pub use creeping::{Along, creeping};
 pub use entering::entering;
 pub use obscured::obscured;
@@ -42,6 +46,7 @@ use std::time::{Duration, Instant};
 pub struct Inference {
     landings: Landings,
     marks: Marks,
+    centring: Centring,
 }
 
 /// What inferring a frame took.
@@ -93,6 +98,32 @@ impl Inference {
             cost.cast(new, &to, rays);
         }
         cost
+    }
+
+    /// Makes `new` as [`Inference::infer`] does, but with every sample at its pixel's centre.
+    pub fn infer_centred(
+        &mut self,
+        (old, old_view): (&BuzzBuffer, &View),
+        (new, new_view): (&mut BuzzBuffer, &View),
+        origin: DVec3,
+        trust: Trust,
+        rays: &impl CastCentres,
+    ) -> Cost {
+        let (landings, marks, centring) = (&mut self.landings, &mut self.marks, &mut self.centring);
+        let (from, to) = (Projector::new(old_view, origin), Projector::new(new_view, origin));
+        landings.clear(old.object.len());
+        marks.clear(old.object.len());
+        let nearest = project(old, &to, landings, marks);
+        obscured(old, &from, &to, landings, marks);
+        if let Some(k) = nearest {
+            entering(old_view, new_view, f64::from(k), marks);
+        }
+
+        // Centre what lies within surfaces, then cast rays at edges and at what nothing explains.
+        centring.recentre(old, (landings, marks), &to, rays, trust, new);
+        let start = Instant::now();
+        let rays = centring.cast(old, &to, rays, trust, new);
+        Cost { rays, tracing: start.elapsed() }
     }
 }
 

@@ -40,13 +40,26 @@ pub fn obscured(
             if let Some(line) = Line::new(new_view, position.extend(1.0), direction.extend(0.0)) {
                 let begin = new_view.project_unclipped(position);
                 line.walk(new_view, |pixel, int_z| {
-                    if Some(pixel) != begin && landings.z(pixel).is_some_and(|z| z > int_z) {
+                    if Some(pixel) != begin
+                        && landings
+                            .z(pixel)
+                            .or_else(|| around(landings, pixel, width))
+                            .is_none_or(|z| z > int_z)
+                    {
                         marks.set(pixel, PixelClass::Bad);
                     }
                 });
             }
         }
     });
+}
+
+/// The greatest depth that landed on one of the eight neighbours of a pixel.
+fn around(landings: &Landings, pixel: usize, width: usize) -> Option<f32> {
+    let pixels = landings.pixels();
+    let rows = [pixel.wrapping_sub(width), pixel, pixel + width];
+    let all = rows.into_iter().flat_map(|p| [p.wrapping_sub(1), p, p + 1]);
+    all.filter(|&p| p < pixels).filter_map(|p| landings.z(p)).reduce(f32::max)
 }
 
 /// True where one of the eight neighbours lies behind the sample, or is not known because the image ends.

@@ -9,7 +9,7 @@ mod segments;
 
 pub use motion::{PathFrame, ProbePoint, Step};
 
-use crate::frame::FrameKind;
+use crate::frame::{FrameKind, Quality};
 use motion::find_cuts;
 use segments::{Chain, divide};
 
@@ -103,8 +103,8 @@ pub struct Plan {
 /// What a plan may do.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct PlanOptions {
-    /// Trace every frame.
-    pub full: bool,
+    /// How frames are inferred, if they are.
+    pub quality: Quality,
     /// Longest segment in frames, at least 1.
     pub longest_segment: u32,
 }
@@ -120,8 +120,10 @@ pub fn plan(path: &[PathFrame], cuts: &[i64], options: PlanOptions) -> Plan {
     let mut first = 0;
     while first < path.len() {
         let end = (first + 1..path.len()).find(|&i| plan.cuts.contains(&path[i].frame)).unwrap_or(path.len());
-        let half = if options.full { 0 } else { options.longest_segment.saturating_sub(1) as usize };
-        let chains = Chain::of_shot(&steps[first..end.max(first + 1) - 1], half);
+        let full = options.quality == Quality::Full;
+        let half = if full { 0 } else { options.longest_segment.saturating_sub(1) as usize };
+        let shot = &steps[first..end.max(first + 1) - 1];
+        let chains = Chain::of_shot(shot, half, options.quality.is_centred());
         for range in divide(&chains, end - first) {
             let segment = Segment {
                 key: path[first + range.key].frame,
@@ -132,7 +134,7 @@ pub fn plan(path: &[PathFrame], cuts: &[i64], options: PlanOptions) -> Plan {
                 _ if path.len() == 1 => Reason::Only,
                 0 if first == 0 => Reason::First,
                 0 => Reason::Cut,
-                i if options.full || steps[first + i - 1].is_dear() => Reason::Cost,
+                i if full || steps[first + i - 1].is_dear() => Reason::Cost,
                 _ => Reason::Length,
             };
             plan.keyframes.push(KeyFrame { frame: segment.key, reason });

@@ -18,6 +18,9 @@ const MUCH_MOTION: f64 = 30.0;
 const STEP_DECAY: f64 = 0.4;
 const DECAY_MOTION: f64 = 10.0;
 
+/// Share of pixels at the edges of surfaces, which are cast in every frame where samples are centred.
+const EDGES: f64 = 0.15;
+
 /// Predicted costs of the frames inferred outward from one key frame.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Chain {
@@ -41,13 +44,14 @@ pub struct Range {
 impl Chain {
     /// The chains of every possible key frame of a shot with these steps, of segments up to `others` frames besides
     /// the key: at most half of them before it, so that together they keep to the length.
-    pub fn of_shot(steps: &[Step], others: usize) -> Vec<Self> {
+    pub fn of_shot(steps: &[Step], others: usize, centred: bool) -> Vec<Self> {
         let predict = |steps: &mut dyn Iterator<Item = (f64, f64, bool)>, longest: usize| {
             let mut order = 1.0;
             let chain = steps.take(longest).map_while(|(new, pixels, changed)| {
                 order *= (-STEP_DECAY * (1.0 - (-pixels / DECAY_MOTION).exp())).exp();
                 let decayed = DECAYED[0] + (DECAYED[1] - DECAYED[0]) * (pixels / MUCH_MOTION).min(1.0);
-                let traced = (new + decayed * (1.0 - order)).min(1.0);
+                let traced = new + if centred { EDGES } else { decayed * (1.0 - order) };
+                let traced = traced.min(1.0);
                 (!changed && traced <= Step::DEAR).then_some(traced)
             });
             chain.collect::<Vec<_>>()

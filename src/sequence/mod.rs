@@ -5,6 +5,7 @@
 mod path;
 mod resolve;
 
+pub use crate::frame::Quality;
 pub use path::camera_path;
 
 use crate::accel::Accel;
@@ -12,7 +13,7 @@ use crate::error::{Error, Result};
 use crate::frame::{
     Aov, AovSet, Frame, FrameKind, FrameStats, PixelClass, RayCounts, StageSeconds, SurfaceSample, Window,
 };
-use crate::infer::{BuzzBuffer, CastRays, Inference, Projector};
+use crate::infer::{BuzzBuffer, CastCentres, CastRays, Inference, Projector, Trust};
 use crate::plan::{Plan, Segment};
 use crate::scene::{Pose, Scene, View};
 use crate::trace::{TraceOptions, Tracer};
@@ -33,29 +34,11 @@ pub trait FrameSink {
     fn finish(&mut self) -> Result<Vec<(i64, StageSeconds)>>;
 }
 
-/// How accurate an inferred frame is.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum Quality {
-    /// Every frame is traced.
-    Full,
-    /// The paper's guarantee: every sample lies inside its pixel.
-    #[default]
-    HalfPixel,
-}
-
-impl Quality {
-    /// The word on the command line and in reports.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Full => "full",
-            Self::HalfPixel => "half-pixel",
-        }
-    }
-}
-
 /// How to render a sequence.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Settings {
+    /// How frames are inferred; which, the plan says.
+    pub quality: Quality,
     /// Full image, pixels.
     pub width: u32,
     /// Full image, pixels.
@@ -83,6 +66,7 @@ impl Settings {
     /// The whole image, beauty only.
     pub fn new(width: u32, height: u32) -> Self {
         Self {
+            quality: Quality::default(),
             width,
             height,
             window: Window { x: 0, y: 0, width, height },
@@ -224,7 +208,14 @@ fn render_segment(
             let source = if i == 0 { &*key } else { &*old };
             let start = Instant::now();
             let caster = emitter.caster(&to.view, number);
-            let cost = inference.infer((source, &from.view), (new, &to.view), origin, &caster);
+            let (source, target) = ((source, &from.view), (&mut *new, &to.view));
+            let cost = match settings.quality {
+                Quality::Full | Quality::HalfPixel => inference.infer(source, target, origin, &caster),
+                Quality::Centred => {
+                    inference.infer_centred(source, target, origin, Trust::Neighbours, &caster)
+                }
+                Quality::Verified => inference.infer_centred(source, target, origin, Trust::Proof, &caster),
+            };
             let mut stats = FrameStats { rays: cost.rays, ..FrameStats::default() };
             stats.seconds.trace = cost.tracing.as_secs_f64();
             stats.seconds.infer = start.elapsed().as_secs_f64() - stats.seconds.trace;
@@ -271,6 +262,30 @@ impl CastRays for Caster<'_> {
             [bits as u32, (bits >> 32) as u32].map(|b| f64::from(b) / (f64::from(u32::MAX) + 1.0))
         });
         self.tracer.cast(self.view, x as f64 + offset[0], y as f64 + offset[1], lit, counts)
+    }
+}
+
+impl CastCentres for Caster<'_> {
+    fn hit(&self, x: usize, y: usize, counts: &mut RayCounts) -> SurfaceSample {
+        self.tracer.hit(self.view, x as f64 + 0.5, y as f64 + 0.5, counts)
+    }
+
+    fn recast(&self, sample: &SurfaceSample, ask: &[u32], lit: &mut [u32], counts: &mut RayCounts) {
+        self.tracer.recast(sample, ask, lit, counts);
+    }
+
+    fn nearest_of(
+        &self,
+        x: usize,
+        y: usize,
+        candidates: impl Iterator<Item = SurfaceSample>,
+    ) -> Option<SurfaceSample> {
+        self.tracer.nearest_of(self.view, x as f64 + 0.5, y as f64 + 0.5, candidates)
+    }
+
+    fn is_hidden(&self, sample: &SurfaceSample, counts: &mut RayCounts) -> bool {
+        counts.visibility += 1;
+        self.tracer.is_hidden(self.view, sample)
     }
 }
 

@@ -1,0 +1,168 @@
+//! Past the paper: samples at the centres of their pixels.
+//!
+//! The half-pixel guarantee lets a reused sample lie anywhere inside its pixel. Passed on from frame to frame such
+//! samples drift into a random pattern: pixels are missed that nothing new has come into, and edges turn rough. Here
+//! every pixel gets the sample that the ray through its centre would return:
+//!
+//! - Where every sample of the neighbourhood landed on its centre nothing moves, and the sample is kept as it is.
+//! - Within a surface, where the whole neighbourhood shows it without a step, the centre ray is intersected with the
+//!   triangles that the neighbourhood names, and with nothing else: no ray is cast into the scene. A pixel on which
+//!   nothing landed is filled in the same way.
+//! - Everywhere else a ray is cast, so that an edge moves even if it moves by less than half a pixel a frame.
+//!
+//! Shadow bits are settled light by light. The points around say whether a light reaches the surface here: where they
+//! agree they are believed; where they do not, the shadow's edge is near and a ray is cast to that light alone. The bits
+//! around a wrong bit disagree with it, so an error does not live on.
+
+use super::Marks;
+use super::around::{Around, Sources, Trust, is_one_surface};
+use super::buzz_buffer::{BuzzBuffer, CastRays, Projector, Row, UNKNOWN};
+use super::project::Landings;
+use crate::frame::{PixelClass, RayCounts, SurfaceSample};
+use rayon::prelude::*;
+
+/// What re-centring asks of the scene, beside whole rays: parts of one, and surfaces that are known already.
+pub trait CastCentres: CastRays {
+    /// The sample that the ray through the centre of pixel (x, y) finds; no light is asked for.
+    fn hit(&self, x: usize, y: usize, counts: &mut RayCounts) -> SurfaceSample;
+
+    /// Finds out which of the lights named by the bits of `ask` reach the sample, and changes their bits in `lit`.
+    fn recast(&self, sample: &SurfaceSample, ask: &[u32], lit: &mut [u32], counts: &mut RayCounts);
+
+    /// What the ray through the centre of pixel (x, y) meets first of the triangles that `candidates` lie on. Where these
+    /// are the background: that. Not counted, as nothing is looked for in the scene.
+    fn nearest_of(
+        &self,
+        x: usize,
+        y: usize,
+        candidates: impl Iterator<Item = SurfaceSample>,
+    ) -> Option<SurfaceSample>;
+
+    /// True if something hides the sample from the eye. Counted as `visibility`.
+    fn is_hidden(&self, sample: &SurfaceSample, counts: &mut RayCounts) -> bool;
+}
+
+/// So many samples must be known in the 3x3 around a pixel before it is filled from them.
+const ENOUGH_TO_FILL: usize = 3;
+
+/// What re-centring holds between frames, so that nothing is allocated for each.
+#[derive(Debug, Default)]
+pub struct Centring {
+    sources: Sources,
+    /// For each pixel: bits of the lights that have to be asked.
+    ask: Vec<u32>,
+}
+
+impl Centring {
+    /// Centres what can be centred without a ray. All other pixels are left unknown; their class says why.
+    pub fn recentre(
+        &mut self,
+        old: &BuzzBuffer,
+        (landings, marks): (&Landings, &Marks),
+        view: &Projector,
+        rays: &impl CastCentres,
+        trust: Trust,
+        new: &mut BuzzBuffer,
+    ) {
+        self.sources.settle(old, view, landings, marks);
+        let (width, words) = (old.width(), old.lit_words());
+        // Without lights there are no words, but a chunk's length may not be zero.
+        self.ask.resize((old.object.len() * words).max(old.height()), 0);
+        let sources = &self.sources;
+        let rows = new.rows_mut().zip(self.ask.par_chunks_mut((width * words).max(1)));
+        rows.enumerate().for_each(|(y, (mut row, ask))| {
+            ask.fill(0);
+            for x in 0..width {
+                let (pixel, ask) = (y * width + x, &mut ask[x * words..][..words]);
+                let own = sources.of(pixel);
+                row.object[x] = UNKNOWN;
+                row.class[x] = match (own, marks.get(pixel)) {
+                    (None, Some(PixelClass::Entering)) => PixelClass::Entering,
+                    (None, _) => PixelClass::Missed,
+                    (_, mark) => mark.unwrap_or(PixelClass::Good),
+                };
+                if sources.is_suspect(pixel) {
+                    continue;
+                }
+                let around = Around::new(old, view, sources, (x, y), 1);
+                if let Some(i) = own
+                    && around.stands_still()
+                {
+                    row.put(x, view, &old.sample(i));
+                    row.lit_mut(x).copy_from_slice(old.lit(i));
+                    continue;
+                }
+                let nearby = || around.known().next().filter(|_| around.known().count() >= ENOUGH_TO_FILL);
+                let centred = own.or_else(nearby).filter(|&i| around.shows_one_surface(i)).and_then(|i| {
+                    let sample = rays.nearest_of(x, y, around.candidates(i))?;
+                    Some((i, sample))
+                });
+                if let Some((i, sample)) = centred {
+                    row.put(x, view, &sample);
+                    row.lit_mut(x).copy_from_slice(old.lit(i));
+                    if around.is_complete() {
+                        around.disagreement(trust, ask);
+                    } else {
+                        // A hole may hide a shadow's edge: look around it.
+                        Around::new(old, view, sources, (x, y), 2).disagreement(trust, ask);
+                    }
+                }
+                row.class[x] = match (own, centred) {
+                    (None, Some(_)) => PixelClass::Filled,
+                    (Some(_), None) => PixelClass::Edge,
+                    _ => row.class[x],
+                };
+            }
+        });
+    }
+
+    /// Casts the rays that are still wanted: to see what pixels show, and to the lights that may reach it.
+    pub fn cast(
+        &mut self,
+        old: &BuzzBuffer,
+        view: &Projector,
+        rays: &impl CastCentres,
+        trust: Trust,
+        new: &mut BuzzBuffer,
+    ) -> RayCounts {
+        let (width, words) = (old.width(), old.lit_words());
+        let sources = &self.sources;
+        let cast_row = |y: usize, mut row: Row<'_>, ask: &mut [u32]| {
+            let mut counts = RayCounts::default();
+            if rays.is_cancelled() {
+                return counts;
+            }
+            for x in 0..width {
+                let (pixel, ask) = (y * width + x, &mut ask[x * words..][..words]);
+                let known = row.object[x] != UNKNOWN;
+                if known && trust == Trust::Proof && rays.is_hidden(&row.sample(x), &mut counts) {
+                    row.class[x] = PixelClass::Bad;
+                    row.object[x] = UNKNOWN;
+                }
+                if row.object[x] == UNKNOWN {
+                    let sample = rays.hit(x, y, &mut counts);
+                    row.put(x, view, &sample);
+                    row.lit_mut(x).fill(0);
+                    ask.fill(u32::MAX);
+                    let own = sources.of(pixel);
+                    if own.is_some_and(|i| is_one_surface(&sample, &old.sample(i), view)) {
+                        let around = Around::new(old, view, sources, (x, y), 2);
+                        around.lend(&sample, trust, row.lit_mut(x), ask);
+                    }
+                }
+                if ask.iter().any(|&bits| bits != 0) {
+                    rays.recast(&row.sample(x), ask, row.lit_mut(x), &mut counts);
+                }
+            }
+            counts
+        };
+        let rows = new.rows_mut().zip(self.ask.par_chunks_mut((width * words).max(1)));
+        rows.enumerate().map(|(y, (row, ask))| cast_row(y, row, ask)).reduce(
+            RayCounts::default,
+            |mut a, b| {
+                a += b;
+                a
+            },
+        )
+    }
+}
