@@ -18,6 +18,7 @@ use super::Marks;
 use super::around::{Around, Sources, Trust, is_one_surface};
 use super::buzz_buffer::{BuzzBuffer, CastRays, Projector, Row, UNKNOWN};
 use super::project::Landings;
+use super::shadow_edges::ShadowEdges;
 use crate::frame::{PixelClass, RayCounts, SurfaceSample};
 use rayon::prelude::*;
 
@@ -51,6 +52,7 @@ pub struct Centring {
     sources: Sources,
     /// For each pixel: bits of the lights that have to be asked.
     ask: Vec<u32>,
+    shadow_edges: ShadowEdges,
 }
 
 impl Centring {
@@ -157,12 +159,12 @@ impl Centring {
             counts
         };
         let rows = new.rows_mut().zip(self.ask.par_chunks_mut((width * words).max(1)));
-        rows.enumerate().map(|(y, (row, ask))| cast_row(y, row, ask)).reduce(
-            RayCounts::default,
-            |mut a, b| {
-                a += b;
-                a
-            },
-        )
+        let counts = rows.enumerate().map(|(y, (row, ask))| cast_row(y, row, ask));
+        let mut counts = counts.reduce(RayCounts::default, |mut a, b| {
+            a += b;
+            a
+        });
+        counts += self.shadow_edges.follow(new, view, &mut self.ask, rays);
+        counts
     }
 }

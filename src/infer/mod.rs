@@ -23,6 +23,7 @@ mod creeping;
 mod entering;
 mod obscured;
 mod project;
+mod shadow_edges;
 
 pub use around::Trust;
 pub use buzz_buffer::{BuzzBuffer, CastRays, Projected, Projector, UNKNOWN};

@@ -1,0 +1,128 @@
+//! Follows the edges of shadows from where they are known to where they are not.
+//!
+//! A shadow too thin to be sampled when it was far away may be several pixels wide by now, with all samples around it
+//! agreeing that there is none. But it is known somewhere: where it is nearer, or was traced. So wherever two neighbours
+//! on one surface disagree about a light, a ray is cast to it from both; where that changes a bit, the pixels around are
+//! looked at again, until the edge has been followed to its end.
+
+use super::around::is_one_surface;
+use super::buzz_buffer::{BuzzBuffer, Projector};
+use super::centre::CastCentres;
+use crate::frame::RayCounts;
+use rayon::prelude::*;
+
+/// What following holds between frames, so that nothing is allocated for each.
+#[derive(Debug, Default)]
+pub(super) struct ShadowEdges {
+    /// For each row: pixels at which neighbours disagree.
+    rows: Vec<Vec<u32>>,
+    /// Pixels to look at, in order; those to look at next.
+    pixels: Vec<u32>,
+    next: Vec<u32>,
+    /// For each of `pixels`, in as many words as a pixel has shadow bits: the lights to ask, and the bits then.
+    ask: Vec<u32>,
+    lit: Vec<u32>,
+}
+
+impl ShadowEdges {
+    /// Settles the shadow bits of `buffer`, which is complete. `asked` has the bits of the lights that each pixel has
+    /// asked already; those that it asks here are added.
+    pub fn follow(
+        &mut self,
+        buffer: &mut BuzzBuffer,
+        view: &Projector,
+        asked: &mut [u32],
+        rays: &impl CastCentres,
+    ) -> RayCounts {
+        let mut counts = RayCounts::default();
+        let (width, words) = (buffer.width(), buffer.lit_words());
+        if words == 0 {
+            return counts;
+        }
+        self.rows.resize_with(buffer.height(), Vec::new);
+        self.rows.par_iter_mut().with_min_len(8).enumerate().for_each(|(y, row)| {
+            let disagrees = |&pixel: &u32| {
+                let asked = &asked[pixel as usize * words..][..words];
+                around(buffer, pixel).any(|k| disagree(buffer, view, pixel as usize, k, asked))
+            };
+            row.clear();
+            row.extend(((y * width) as u32..((y + 1) * width) as u32).filter(disagrees));
+        });
+        self.pixels.clear();
+        self.rows.iter().for_each(|row| self.pixels.extend(row));
+        while !self.pixels.is_empty() && !rays.is_cancelled() {
+            counts += self.ask(buffer, view, asked, rays);
+            self.apply(buffer, asked);
+        }
+        counts
+    }
+
+    /// Asks the lights about which any neighbour disagrees.
+    fn ask(
+        &mut self,
+        buffer: &BuzzBuffer,
+        view: &Projector,
+        asked: &[u32],
+        rays: &impl CastCentres,
+    ) -> RayCounts {
+        let words = buffer.lit_words();
+        self.ask.clear();
+        self.ask.resize(self.pixels.len() * words, 0);
+        self.lit.resize(self.pixels.len() * words, 0);
+        let ask_one = |((&pixel, ask), lit): ((&u32, &mut [u32]), &mut [u32])| {
+            let i = pixel as usize;
+            lit.copy_from_slice(buffer.lit(i));
+            for k in around(buffer, pixel) {
+                if disagree(buffer, view, i, k, &asked[i * words..][..words]) {
+                    for (word, ask) in ask.iter_mut().enumerate() {
+                        *ask |= (lit[word] ^ buffer.lit(k)[word]) & !asked[i * words + word];
+                    }
+                }
+            }
+            let mut counts = RayCounts::default();
+            rays.recast(&buffer.sample(i), ask, lit, &mut counts);
+            counts
+        };
+        let all =
+            self.pixels.par_iter().zip(self.ask.par_chunks_mut(words)).zip(self.lit.par_chunks_mut(words));
+        all.with_min_len(64).map(ask_one).reduce(RayCounts::default, |mut a, b| {
+            a += b;
+            a
+        })
+    }
+
+    /// Takes over the answers; where they change a bit, the pixels around are looked at next.
+    fn apply(&mut self, buffer: &mut BuzzBuffer, asked: &mut [u32]) {
+        let words = buffer.lit_words();
+        self.next.clear();
+        let answers = self.ask.chunks(words).zip(self.lit.chunks(words));
+        for (&pixel, (ask, lit)) in self.pixels.iter().zip(answers) {
+            let i = pixel as usize;
+            asked[i * words..].iter_mut().zip(ask).for_each(|(asked, ask)| *asked |= ask);
+            if buffer.lit(i) != lit {
+                buffer.lit[i * words..][..words].copy_from_slice(lit);
+                self.next.push(pixel);
+                self.next.extend(around(buffer, pixel).map(|k| k as u32));
+            }
+        }
+        self.next.sort_unstable();
+        self.next.dedup();
+        std::mem::swap(&mut self.pixels, &mut self.next);
+    }
+}
+
+/// The pixels around one, inside the image.
+fn around(buffer: &BuzzBuffer, pixel: u32) -> impl Iterator<Item = usize> + use<> {
+    let (width, height) = (buffer.width(), buffer.height());
+    let (x, y) = (pixel as usize % width, pixel as usize / width);
+    let columns = x.saturating_sub(1)..=(x + 1).min(width - 1);
+    let rows = y.saturating_sub(1)..=(y + 1).min(height - 1);
+    rows.flat_map(move |y| columns.clone().map(move |x| y * width + x)).filter(move |&k| k != pixel as usize)
+}
+
+/// True where pixels `i` and `k` show one surface and differ in a light that `i` has not asked.
+fn disagree(buffer: &BuzzBuffer, view: &Projector, i: usize, k: usize, asked: &[u32]) -> bool {
+    let mut words = buffer.lit(i).iter().zip(buffer.lit(k)).zip(asked);
+    words.any(|((a, b), asked)| (a ^ b) & !asked != 0)
+        && is_one_surface(&buffer.sample(i), &buffer.sample(k), view)
+}
