@@ -41,12 +41,14 @@ impl ShadowEdges {
         }
         self.rows.resize_with(buffer.height(), Vec::new);
         self.rows.par_iter_mut().with_min_len(8).enumerate().for_each(|(y, row)| {
-            let disagrees = |&pixel: &u32| {
-                let asked = &asked[pixel as usize * words..][..words];
-                around(buffer, pixel).any(|k| disagree(buffer, view, pixel as usize, k, asked))
-            };
             row.clear();
-            row.extend(((y * width) as u32..((y + 1) * width) as u32).filter(disagrees));
+            for pixel in y * width..(y + 1) * width {
+                let asked = &asked[pixel * words..][..words];
+                let disagrees = |k| disagree(buffer, view, pixel, k, asked);
+                if differs_around(buffer, pixel, y) && around(buffer, pixel as u32).any(disagrees) {
+                    row.push(pixel as u32);
+                }
+            }
         });
         self.pixels.clear();
         self.rows.iter().for_each(|row| self.pixels.extend(row));
@@ -109,6 +111,22 @@ impl ShadowEdges {
         self.next.dedup();
         std::mem::swap(&mut self.pixels, &mut self.next);
     }
+}
+
+/// True where the shadow bits of pixel `i`, in row `y`, may differ from those of a pixel around it.
+fn differs_around(buffer: &BuzzBuffer, i: usize, y: usize) -> bool {
+    let (width, words) = (buffer.width(), buffer.lit_words());
+    if y == 0 || y + 1 == buffer.height() || words > 1 || i == y * width || i + 1 == (y + 1) * width {
+        return true;
+    }
+    let row = |i: usize| {
+        let lit = &buffer.lit[i - 1..=i + 1];
+        [lit[0], lit[1], lit[2]]
+    };
+    let own = buffer.lit[i];
+    let differ =
+        [row(i - width), row(i), row(i + width)].as_flattened().iter().fold(0, |d, bits| d | (bits ^ own));
+    differ != 0
 }
 
 /// The pixels around one, inside the image.
