@@ -66,6 +66,11 @@ impl Sources {
         (source != NOTHING).then_some(source as usize)
     }
 
+    /// True if a sample landed on the pixel's very centre.
+    pub fn is_centred(&self, pixel: usize) -> bool {
+        self.of(pixel).is_some() && self.0[pixel] & MOVED == 0
+    }
+
     /// True if something unknown may stand in front here.
     pub fn is_suspect(&self, pixel: usize) -> bool {
         self.0[pixel] & SUSPECT != 0

@@ -102,11 +102,12 @@ impl Centring {
                 if let Some((i, sample)) = centred {
                     row.put(x, view, &sample);
                     row.lit_mut(x).copy_from_slice(old.lit(i));
-                    if around.is_complete() {
+                    // Where it is the very sample that landed here, its lights are known.
+                    if !sources.is_centred(pixel) {
+                        // A hole may hide a shadow's edge: then look farther.
+                        let wide = || Around::new(old, view, sources, (x, y), 2);
+                        let around = if around.is_complete() { around } else { wide() };
                         around.disagreement(trust, ask);
-                    } else {
-                        // A hole may hide a shadow's edge: look around it.
-                        Around::new(old, view, sources, (x, y), 2).disagreement(trust, ask);
                     }
                 }
                 row.class[x] = match (own, centred) {
@@ -154,6 +155,9 @@ impl Centring {
                 }
                 if ask.iter().any(|&bits| bits != 0) {
                     rays.recast(&row.sample(x), ask, row.lit_mut(x), &mut counts);
+                } else if sources.is_centred(pixel) {
+                    // Its lights were asked when it was cast.
+                    ask.fill(u32::MAX);
                 }
             }
             counts

@@ -1,7 +1,7 @@
 //! The paper: S. J. Adelson and L. F. Hodges, *Exploiting Spatio-Temporal Coherence in Ray-Traced Animation Frames*,
 //! GIT-GVU-93-01, Georgia Institute of Technology, 1993.
 //!
-//! [`Inference::infer`] is its algorithm box. Nothing here knows a file format or a renderer: it is given a buffer of
+//! [`Inference::infer`] is its algorithm box; [`Inference::infer_centred`] goes past it. Nothing here knows a file format or a renderer: it is given a buffer of
 //! samples, two views, and something that casts a ray when told to. `docs/algorithm.md` maps every section of the
 //! paper to a function here and says where and why we depart from it.
 //!
@@ -15,6 +15,7 @@
 //! | L, C, C1, (endx, endy), int_z | `Line` in `obscured.rs` |
 //! | test_z | in [`creeping()`] |
 //! | P, k | [`entering()`] |
+//! | (not in the paper) samples at pixel centres, shadows' edges followed | [`Centring`] |
 
 mod around;
 mod buzz_buffer;
@@ -71,9 +72,44 @@ impl Inference {
         origin: DVec3,
         rays: &impl CastRays,
     ) -> Cost {
+        let to = Projector::new(new_view, origin);
+        let mut cost = Cost::default();
+        self.reproject(old, old_view, new_view, origin);
+        gather(old, &self.landings, &self.marks, new);
+
+        // Ray-cast the positions that nothing explains, then the gaps that opened inside objects.
+        cost.add(|| new.cast_unknown(&to, rays));
+        for along in [Along::Columns, Along::Rows] {
+            creeping(new, &self.landings, along, &self.marks);
+            forget_creeping(new, &self.marks);
+            cost.add(|| new.cast_unknown(&to, rays));
+        }
+        cost
+    }
+
+    /// Makes `new` as [`Inference::infer`] does, but with every sample at its pixel's centre (past the paper).
+    pub fn infer_centred(
+        &mut self,
+        (old, old_view): (&BuzzBuffer, &View),
+        (new, new_view): (&mut BuzzBuffer, &View),
+        origin: DVec3,
+        trust: Trust,
+        rays: &impl CastCentres,
+    ) -> Cost {
+        let to = Projector::new(new_view, origin);
+        let mut cost = Cost::default();
+        self.reproject(old, old_view, new_view, origin);
+
+        // Centre what lies within surfaces; cast rays at edges, at what nothing explains, and along shadows' edges.
+        self.centring.recentre(old, (&self.landings, &self.marks), &to, rays, trust, new);
+        cost.add(|| self.centring.cast(old, &to, rays, trust, new));
+        cost
+    }
+
+    /// Finds which old sample each new pixel shows, and where that is not to be believed.
+    fn reproject(&mut self, old: &BuzzBuffer, old_view: &View, new_view: &View, origin: DVec3) {
         let (landings, marks) = (&mut self.landings, &mut self.marks);
         let (from, to) = (Projector::new(old_view, origin), Projector::new(new_view, origin));
-        let mut cost = Cost::default();
 
         // Initialise the Buzzbuffer.
         landings.clear(old.object.len());
@@ -89,49 +125,14 @@ impl Inference {
         if let Some(k) = nearest {
             entering(old_view, new_view, f64::from(k), marks);
         }
-        gather(old, landings, marks, new);
-
-        // Ray-cast the positions that nothing explains, then the gaps that opened inside objects.
-        cost.cast(new, &to, rays);
-        for along in [Along::Columns, Along::Rows] {
-            creeping(new, landings, along, marks);
-            forget_creeping(new, marks);
-            cost.cast(new, &to, rays);
-        }
-        cost
-    }
-
-    /// Makes `new` as [`Inference::infer`] does, but with every sample at its pixel's centre.
-    pub fn infer_centred(
-        &mut self,
-        (old, old_view): (&BuzzBuffer, &View),
-        (new, new_view): (&mut BuzzBuffer, &View),
-        origin: DVec3,
-        trust: Trust,
-        rays: &impl CastCentres,
-    ) -> Cost {
-        let (landings, marks, centring) = (&mut self.landings, &mut self.marks, &mut self.centring);
-        let (from, to) = (Projector::new(old_view, origin), Projector::new(new_view, origin));
-        landings.clear(old.object.len());
-        marks.clear(old.object.len());
-        let nearest = project(old, &to, landings, marks);
-        obscured(old, &from, &to, landings, marks);
-        if let Some(k) = nearest {
-            entering(old_view, new_view, f64::from(k), marks);
-        }
-
-        // Centre what lies within surfaces, then cast rays at edges and at what nothing explains.
-        centring.recentre(old, (landings, marks), &to, rays, trust, new);
-        let start = Instant::now();
-        let rays = centring.cast(old, &to, rays, trust, new);
-        Cost { rays, tracing: start.elapsed() }
     }
 }
 
 impl Cost {
-    fn cast(&mut self, buffer: &mut BuzzBuffer, view: &Projector, rays: &impl CastRays) {
+    /// Adds what `cast` casts, and the time that it takes.
+    fn add(&mut self, cast: impl FnOnce() -> RayCounts) {
         let start = Instant::now();
-        self.rays += buffer.cast_unknown(view, rays);
+        self.rays += cast();
         self.tracing += start.elapsed();
     }
 }
