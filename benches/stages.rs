@@ -47,7 +47,7 @@ fn stages(c: &mut Criterion) {
     let origin: DVec3 = from.eye;
     let mut accel = Accel::new(&scene);
     accel.place(&scene, &pose, origin);
-    let tracer = Tracer::new(&scene, &accel, &pose, TraceOptions { bounces: 4 });
+    let tracer = Tracer::new(&scene, &accel, &pose, TraceOptions::default());
     let (old_view, new_view) = (Projector::new(&from, origin), Projector::new(&to, origin));
     let fresh = || BuzzBuffer::new(WIDTH as usize, HEIGHT as usize, tracer.lit_words());
     let (mut old, mut new) = (fresh(), fresh());

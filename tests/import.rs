@@ -6,7 +6,10 @@
 use buzz::{
     Error,
     import::{ImportOptions, import},
-    scene::{AlphaMode, Interpolation, LightKind, LocalTransform, Projection, Rational, Scene, Target, Wrap},
+    scene::{
+        AlphaMode, Interpolation, LightKind, LocalTransform, Outline, Projection, Rational, Scene, Target,
+        Wrap,
+    },
 };
 use glam::{DVec3, Vec2, Vec3};
 use serde_json::json;
@@ -736,7 +739,7 @@ fn lights_are_radiometric_whatever_their_parents_scale() {
     let light = &scene.lights[0];
     assert_eq!((light.name.as_str(), light.intensity, light.range), ("Spot", 2.0, Some(9.0)));
     assert_eq!(light.kind, LightKind::Spot { inner_cone: 0.2, outer_cone: 0.4 });
-    assert_eq!(features(&scene), ["light radius"]);
+    assert_eq!((light.size, features(&scene)), (0.1, vec![]));
     let posed = &scene.pose(0.0).lights[0];
     assert_eq!((posed.position, posed.direction), (DVec3::new(3.0, 0.0, 0.0), DVec3::NEG_Z));
     gltf.json["nodes"][2]["extensions"]["KHR_lights_punctual"]["light"] = json!(2);
@@ -883,6 +886,66 @@ fn pointers_drive_lenses_lights_and_visibility() {
     let LightKind::Spot { inner_cone, outer_cone } = light.kind else { panic!() };
     assert!(close(inner_cone, 0.2) && close(outer_cone, 0.4));
     assert!(!pose.visible[scene.instances[0].node] && scene.pose(0.99).visible[scene.instances[0].node]);
+}
+
+#[test]
+fn lights_have_the_sizes_that_extras_say() {
+    let mut gltf = Gltf::new();
+    let area = |shape: &str| json!({"area": {"shape": shape, "size": [2, 0.5]}, "radius": 7});
+    let lights = json!([
+        {"type": "point", "extras": {"radius": 0.25, "angle": 1}},
+        {"type": "directional", "extras": {"radius": 0.25, "angle": std::f32::consts::PI}},
+        {"type": "spot", "extras": area("rectangle")},
+        {"type": "spot", "extras": area("ellipse")},
+        {"type": "point"},
+    ]);
+    gltf.json["extensions"] = json!({"KHR_lights_punctual": {"lights": lights}});
+    for light in 0..5 {
+        gltf.node(json!({"scale": [3, 3, 3], "extensions": {"KHR_lights_punctual": {"light": light}}}));
+    }
+    let scene = gltf.scene();
+    assert_eq!(features(&scene), [""; 0]);
+    let sizes: Vec<f32> = scene.lights.iter().map(|l| l.size).collect();
+    assert_eq!((sizes[0], sizes[1], sizes[4]), (0.25, std::f32::consts::PI, 0.0));
+    let size = Vec2::new(2.0, 0.5);
+    assert_eq!(scene.lights[2].kind, LightKind::Area { outline: Outline::Rectangle, size });
+    assert_eq!(scene.lights[3].kind, LightKind::Area { outline: Outline::Ellipse, size });
+    assert_eq!([0, 1, 2, 3, 4].map(|l| scene.light_has_size(l)), [true, true, true, true, false]);
+    for (extras, place) in [
+        (json!({"radius": -1}), "extras/radius"),
+        (json!({"radius": "big"}), "extras/radius"),
+        (json!({"area": {"shape": "star", "size": [1, 1]}}), "extras/area"),
+        (json!({"area": {"shape": "ellipse", "size": [1, 0]}}), "extras/area/size"),
+        (json!({"area": {"shape": "ellipse"}}), "extras/area/size"),
+    ] {
+        gltf.json["extensions"]["KHR_lights_punctual"]["lights"][2]["extras"] = extras;
+        assert!(gltf.refused().contains(&format!("lights/2/{place}")), "{}", gltf.refused());
+    }
+    gltf.json["extensions"]["KHR_lights_punctual"]["lights"][1]["extras"] = json!({"angle": 3.15});
+    assert!(gltf.refused().contains("lights/1/extras/angle"));
+}
+
+#[test]
+fn sizes_of_lights_are_animated() {
+    let mut gltf = Gltf::with_triangle();
+    let area = json!({"shape": "rectangle", "size": [1, 1]});
+    let lights =
+        json!([{"type": "point"}, {"type": "directional"}, {"type": "spot", "extras": {"area": area}}]);
+    gltf.json["extensions"] = json!({"KHR_lights_punctual": {"lights": lights}});
+    for light in 0..3 {
+        gltf.node(json!({"extensions": {"KHR_lights_punctual": {"light": light}}}));
+    }
+    let light = "/extensions/KHR_lights_punctual/lights";
+    gltf.pointer(&format!("{light}/0/extras/radius"), &[0.0, 1.0], "SCALAR", &[0.0, 2.0]);
+    gltf.pointer(&format!("{light}/1/extras/angle"), &[0.0, 1.0], "SCALAR", &[-1.0, 0.5]);
+    gltf.pointer(&format!("{light}/2/extras/area/size"), &[0.0, 1.0], "VEC2", &[1.0, 1.0, 3.0, 5.0]);
+    let scene = gltf.scene();
+    assert_eq!(features(&scene), [""; 0]);
+    assert!((0..3).all(|l| scene.light_has_size(l)));
+    let sizes = |time: f64| scene.pose(time).lights.iter().map(|l| l.size).collect::<Vec<_>>();
+    assert_eq!((sizes(0.0), sizes(1.0)), (vec![0.0, 0.0, 0.0], vec![2.0, 0.5, 0.0]));
+    let size = Vec2::new(2.0, 3.0);
+    assert_eq!(scene.pose(0.5).lights[2].kind, LightKind::Area { outline: Outline::Rectangle, size });
 }
 
 #[test]

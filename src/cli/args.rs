@@ -146,6 +146,12 @@ pub struct OutputArgs {
     /// Depth of reflection and refraction.
     #[arg(long, default_value_t = 4, allow_negative_numbers = true, value_parser = clap::value_parser!(u32).range(..=64))]
     pub bounces: u32,
+    /// Shadow rays to each light that has a size; a single one goes to its middle.
+    #[arg(long, value_name = "N", default_value_t = 1, allow_negative_numbers = true, value_parser = clap::value_parser!(u32).range(1..=4096))]
+    pub light_samples: u32,
+    /// Rays a point to the world, for ambient occlusion; without any the world shines through everything.
+    #[arg(long, value_name = "N", default_value_t = 0, allow_negative_numbers = true, value_parser = clap::value_parser!(u32).range(..=4096))]
+    pub ambient_samples: u32,
     /// Cast a ray to every reused sample and report how many are hidden (slow).
     #[arg(long)]
     pub audit: bool,

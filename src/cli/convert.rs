@@ -17,6 +17,7 @@ use buzz::output::{
 use buzz::plan::Plan;
 use buzz::scene::Requirements;
 use buzz::sequence::{FrameSink, Observer, render_sequence};
+use buzz::trace::lit_words;
 use std::collections::BTreeSet;
 use std::path::Path;
 use std::process::ExitCode;
@@ -132,6 +133,8 @@ fn choose_image(job: &mut Job, args: &ConvertArgs) -> Result<()> {
     settings.transparent = args.output.transparent;
     settings.exposure = args.output.exposure;
     settings.bounces = args.output.bounces;
+    settings.light_samples = args.output.light_samples;
+    settings.ambient_samples = args.output.ambient_samples;
     settings.audit = args.output.audit;
     Ok(())
 }
@@ -237,7 +240,7 @@ fn report(input: &Path, job: &Job, plan: &Plan, frames: Vec<FrameRecord>, second
             lights: scene.lights.len(),
             requires: Requirements::of(scene).names().iter().map(|&n| n.into()).collect(),
             ignored: scene.ignored.iter().map(Into::into).collect(),
-            bytes_per_pixel: BuzzBuffer::bytes_per_pixel(scene.lights.len()),
+            bytes_per_pixel: BuzzBuffer::bytes_per_pixel(lit_words(scene, job.settings.trace_options())),
         },
         plan: output::Plan {
             keyframes: keyframes.collect(),

@@ -4,7 +4,8 @@ use super::args::{Format, InspectArgs};
 use super::{job, say};
 use anyhow::Result;
 use buzz::infer::BuzzBuffer;
-use buzz::scene::{Interpolation, LightKind, Projection, Requirements, Scene, Target};
+use buzz::scene::{Interpolation, Light, LightKind, Outline, Projection, Requirements, Scene, Target};
+use buzz::trace::{TraceOptions, lit_words};
 use serde_json::{Value, json};
 use std::process::ExitCode;
 
@@ -21,6 +22,7 @@ pub fn run(args: InspectArgs) -> Result<ExitCode> {
 fn stages(needs: &Requirements) -> Vec<&'static str> {
     let mut stages = vec!["trace", "project", "obscured", "entering", "creeping"];
     let enhance = [
+        (needs.soft_lights, "soft-light"),
         (needs.textures, "texture"),
         (true, "highlights"),
         (needs.reflection, "reflection"),
@@ -38,7 +40,8 @@ fn as_json(scene: &Scene) -> Value {
             json!({"name": c.name, "type": "orthographic", "ymag": ymag})
         }
     });
-    let lights = scene.lights.iter().map(|l| json!({"name": l.name, "type": light_kind(&l.kind)}));
+    let lights =
+        scene.lights.iter().map(|l| json!({"name": l.name, "type": light_kind(l), "size": light_size(l)}));
     let animations = scene.channels.iter().map(|c| {
         let (property, of) = target(scene, c.target);
         json!({"property": property, "of": of, "keys": c.curve.times.len(), "interpolation": interpolation(c.curve.interpolation)})
@@ -56,7 +59,7 @@ fn as_json(scene: &Scene) -> Value {
         "animations": animations.collect::<Vec<_>>(),
         "requires": needs.names(),
         "ignored": ignored.collect::<Vec<_>>(),
-        "bytes_per_pixel": BuzzBuffer::bytes_per_pixel(scene.lights.len()),
+        "bytes_per_pixel": bytes_per_pixel(scene),
         "stages": stages(&needs),
         "fps": [timing.fps.numerator, timing.fps.denominator],
         "frames": [timing.first, timing.last],
@@ -81,23 +84,41 @@ fn as_text(scene: &Scene) -> String {
         text += &format!("camera {i}: {}\n", camera.name);
     }
     for light in &scene.lights {
-        text += &format!("light: {} ({})\n", light.name, light_kind(&light.kind));
+        let size: Vec<String> = light_size(light).iter().map(f32::to_string).collect();
+        let size = if size.is_empty() { String::new() } else { format!(" {}", size.join(" x ")) };
+        text += &format!("light: {} ({}{size})\n", light.name, light_kind(light));
     }
     let names = needs.names();
     let names = if names.is_empty() { "nothing special".into() } else { names.join(", ") };
     text += &format!("requires: {names}\nstages: {}\n", stages(&needs).join(", "));
-    text += &format!("bytes a pixel: {}\n", BuzzBuffer::bytes_per_pixel(scene.lights.len()));
+    text += &format!("bytes a pixel: {}\n", bytes_per_pixel(scene));
     for ignored in &scene.ignored {
         text += &format!("ignored: {} at {}: {}\n", ignored.feature, ignored.place, ignored.effect);
     }
     text
 }
 
-fn light_kind(kind: &LightKind) -> &'static str {
-    match kind {
+/// As it is rendered by default; several shadow rays a light take more.
+fn bytes_per_pixel(scene: &Scene) -> usize {
+    BuzzBuffer::bytes_per_pixel(lit_words(scene, TraceOptions::default()))
+}
+
+fn light_kind(light: &Light) -> &'static str {
+    match light.kind {
         LightKind::Point => "point",
         LightKind::Spot { .. } => "spot",
         LightKind::Directional => "directional",
+        LightKind::Area { outline: Outline::Rectangle, .. } => "rectangle",
+        LightKind::Area { outline: Outline::Ellipse, .. } => "ellipse",
+    }
+}
+
+/// Radius, angle, or width and height; nothing for a light without size.
+fn light_size(light: &Light) -> Vec<f32> {
+    match light.kind {
+        LightKind::Area { size, .. } => size.to_array().to_vec(),
+        _ if light.size > 0.0 => vec![light.size],
+        _ => Vec::new(),
     }
 }
 
@@ -131,5 +152,7 @@ fn target(scene: &Scene, target: Target) -> (&'static str, &str) {
         Target::LightRange(l) => ("range", light(l)),
         Target::LightInnerCone(l) => ("innerConeAngle", light(l)),
         Target::LightOuterCone(l) => ("outerConeAngle", light(l)),
+        Target::LightSize(l) => ("size", light(l)),
+        Target::LightArea(l) => ("area", light(l)),
     }
 }

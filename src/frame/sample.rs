@@ -29,7 +29,7 @@ impl SurfaceRef {
 }
 
 /// What a ray through a pixel found that does not depend on the eye (the paper's intersection point, normal, id_tag).
-/// The shadow bits stand beside it, one bit for each light, in words of 32. The paper's diffuse colour is not stored: it
+/// The shadow bits stand beside it, in words of 32: one for each light, more for one that has a size. The paper's diffuse colour is not stored: it
 /// follows from the bits, and shading goes through the lights that they name anyway, for the highlights.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SurfaceSample {

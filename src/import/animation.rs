@@ -149,6 +149,8 @@ fn pointer_aim(pointer: &str, element: &Element, targets: &Targets, notes: &Note
             ["range"] => light(index, Target::LightRange, 1),
             ["spot", "innerConeAngle"] => light(index, Target::LightInnerCone, 1),
             ["spot", "outerConeAngle"] => light(index, Target::LightOuterCone, 1),
+            ["extras", "radius" | "angle"] => light(index, Target::LightSize, 1),
+            ["extras", "area", "size"] => light(index, Target::LightArea, 2),
             _ => None,
         },
         _ => None,
@@ -238,6 +240,7 @@ fn fit(target: Target, curve: &Curve) -> Curve {
         Target::CameraNear(_) | Target::LightColor(_) | Target::LightIntensity(_) => (0.0, f32::MAX),
         Target::LightInnerCone(_) => (0.0, FRAC_PI_2),
         Target::LightOuterCone(_) => (1e-4, FRAC_PI_2),
+        Target::LightSize(_) | Target::LightArea(_) => (0.0, f32::MAX),
         _ => (f32::MIN, f32::MAX),
     };
     let factor = if matches!(target, Target::LightIntensity(_)) { LUMENS_PER_WATT.recip() } else { 1.0 };

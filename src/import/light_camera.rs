@@ -1,4 +1,4 @@
-//! Cameras and punctual lights, one for each node that carries one.
+//! Cameras and lights, one for each node that carries one.
 
 use super::{
     document::{Document, Element},
@@ -7,10 +7,10 @@ use super::{
 };
 use crate::{
     Result,
-    scene::{Camera, Lens, Light, LightKind, Projection},
+    scene::{Camera, Lens, Light, LightKind, Outline, Projection},
 };
-use glam::{DVec2, Vec3};
-use std::f32::consts::{FRAC_PI_2, FRAC_PI_4};
+use glam::{DVec2, Vec2, Vec3};
+use std::f32::consts::{FRAC_PI_2, FRAC_PI_4, PI};
 
 /// Lumens that glTF's exporters write for a radiant watt.
 pub(super) const LUMENS_PER_WATT: f32 = 683.0;
@@ -98,7 +98,7 @@ pub(super) fn lights(document: &Document, nodes: &Nodes, notes: &Notes) -> Resul
 }
 
 fn light(element: &Element, notes: &Notes) -> Result<Light> {
-    let kind = match element.text("type")? {
+    let mut kind = match element.text("type")? {
         Some("directional") => LightKind::Directional,
         Some("point") => LightKind::Point,
         Some("spot") => {
@@ -115,17 +115,14 @@ fn light(element: &Element, notes: &Notes) -> Result<Light> {
             return Err(element.error(message));
         }
     };
+    let mut size = 0.0;
     if let Some(extras) = element.get("extras") {
-        for (key, effect) in [
-            ("radius", "shadows of this light are sharp"),
-            ("angle", "shadows of this light are sharp"),
-            ("area", "the light is a spot and its shadows are sharp"),
-        ] {
-            let Some(value) = extras.get(key) else { continue };
-            let size = if key == "area" { 1.0 } else { value.as_number()? };
-            if size > 0.0 {
-                notes.add(format!("light {key}"), value.place, effect);
-            }
+        size = match kind {
+            LightKind::Directional => extent(&extras, "angle", PI)?,
+            _ => extent(&extras, "radius", f32::MAX)?,
+        };
+        if let (LightKind::Spot { .. }, Some(area)) = (kind, extras.get("area")) {
+            kind = area_light(&area)?;
         }
         if let Some(specular) = extras.get("specular").filter(|s| s.value.as_f64() != Some(1.0)) {
             notes.add("light specular factor", specular.place, "highlights have their full strength");
@@ -138,6 +135,36 @@ fn light(element: &Element, notes: &Notes) -> Result<Light> {
         kind,
         color: Vec3::from(element.f32s("color", [1.0; 3])?).max(Vec3::ZERO),
         intensity: element.f32("intensity", 1.0)?.max(0.0) / LUMENS_PER_WATT,
+        size,
         range: range.filter(|r| *r > 0.0),
     })
+}
+
+/// How large a light is: a number from 0 to `most`, 0 where it is not given.
+fn extent(extras: &Element, key: &str, most: f32) -> Result<f32> {
+    let value = extras.f32(key, 0.0)?;
+    // An angle of pi, written in single precision, is above it.
+    if (0.0..=most.next_up()).contains(&value) {
+        return Ok(value.min(most));
+    }
+    let limit = if most < f32::MAX { format!(" or above {most}") } else { String::new() };
+    Err(extras.document.error(extras.place_of(key), format!("must not be negative{limit}")))
+}
+
+fn area_light(area: &Element) -> Result<LightKind> {
+    let outline = match area.text("shape")? {
+        Some("rectangle") => Outline::Rectangle,
+        Some("ellipse") => Outline::Ellipse,
+        other => {
+            let message =
+                format!("unknown shape {}; make it rectangle or ellipse", other.unwrap_or("(none)"));
+            return Err(area.error(message));
+        }
+    };
+    let size = Vec2::from(area.f32s("size", [0.0; 2])?);
+    if size.min_element() > 0.0 {
+        Ok(LightKind::Area { outline, size })
+    } else {
+        Err(area.document.error(area.place_of("size"), "must be two numbers above 0"))
+    }
 }

@@ -10,7 +10,7 @@ pub const UNKNOWN: u32 = u32::MAX;
 
 /// One sample a pixel, as structure of arrays, rows from the top.
 ///
-/// State: 41 bytes a pixel, and 4 more for each 32 lights.
+/// State: 41 bytes a pixel, and 4 more for each word of shadow bits.
 #[derive(Debug, Clone, Default)]
 pub struct BuzzBuffer {
     width: usize,
@@ -26,7 +26,7 @@ pub struct BuzzBuffer {
     pub surface: Vec<SurfaceRef>,
     /// See [`SurfaceSample::normal`].
     pub normal: Vec<PackedNormal>,
-    /// Shadow bits, `lit_words` for each pixel: set where the light reaches the point.
+    /// Shadow bits, `lit_words` for each pixel: what of each light reaches the point.
     pub lit: Vec<u32>,
     /// How each pixel was obtained.
     pub class: Vec<PixelClass>,
@@ -50,14 +50,14 @@ impl BuzzBuffer {
         }
     }
 
-    /// Bytes that a pixel of a buffer for `lights` lights takes.
-    pub fn bytes_per_pixel(lights: usize) -> usize {
+    /// Bytes that a pixel of a buffer with so many words of shadow bits takes.
+    pub fn bytes_per_pixel(lit_words: usize) -> usize {
         size_of::<f32>()
             + size_of::<Vec3>()
             + size_of::<u32>()
             + size_of::<SurfaceRef>()
             + size_of::<PackedNormal>()
-            + lights.div_ceil(32) * size_of::<u32>()
+            + lit_words * size_of::<u32>()
             + size_of::<PixelClass>()
     }
 

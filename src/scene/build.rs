@@ -115,7 +115,8 @@ impl Scene {
     pub fn add_light(&mut self, kind: LightKind, intensity: f32, world_from_light: DAffine3) -> usize {
         let node = self.add_node("", world_from_light);
         let name = format!("Light{}", self.lights.len());
-        self.lights.push(Light { name, node, kind, color: Vec3::ONE, intensity, range: None });
+        let (color, size, range) = (Vec3::ONE, 0.0, None);
+        self.lights.push(Light { name, node, kind, color, intensity, size, range });
         self.lights.len() - 1
     }
 

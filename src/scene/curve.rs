@@ -63,6 +63,10 @@ pub enum Target {
     LightInnerCone(usize),
     /// Outer cone angle of a spot light.
     LightOuterCone(usize),
+    /// Radius of a point or spot light, angle of a directional one.
+    LightSize(usize),
+    /// Width and height of an area light.
+    LightArea(usize),
 }
 
 /// An animated property.

@@ -1,6 +1,8 @@
-//! Punctual lights (`KHR_lights_punctual`) in radiometric units, and the world around the scene.
+//! Lights (`KHR_lights_punctual`, and their sizes from `docs/extras.md`) in radiometric units, and the world around the
+//! scene.
 
-use glam::{DVec3, Vec3};
+use super::{Scene, Target};
+use glam::{DVec3, Vec2, Vec3};
 
 /// A light and the node that carries it.
 #[derive(Debug, Clone, PartialEq)]
@@ -13,13 +15,16 @@ pub struct Light {
     pub kind: LightKind,
     /// Linear Rec.709 colour.
     pub color: Vec3,
-    /// Point and spot: W/sr. Directional: W/m2 on a surface that faces it.
+    /// Point and spot: W/sr from afar. Area: W/sr straight ahead. Directional: W/m2 on a surface that faces it.
     pub intensity: f32,
+    /// Point and spot: radius of its sphere, metres. Directional: the angle that its disc fills in the sky, radians.
+    /// 0 for a light without size; an area light has its size in its kind.
+    pub size: f32,
     /// Distance in metres beyond which it does not shine (`KHR_lights_punctual` window), where given.
     pub range: Option<f32>,
 }
 
-/// The three kinds of `KHR_lights_punctual`.
+/// The three kinds of `KHR_lights_punctual`, and what `extras.area` makes of a spot.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum LightKind {
     /// Shines equally to all sides.
@@ -33,6 +38,22 @@ pub enum LightKind {
     },
     /// Infinitely far away.
     Directional,
+    /// Flat, in the node's XY plane; shines from one side, as a diffuse surface does.
+    Area {
+        /// What it is bounded by.
+        outline: Outline,
+        /// Extent along the node's X and Y, metres.
+        size: Vec2,
+    },
+}
+
+/// Bounds of an area light.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Outline {
+    /// As wide and high as the size says.
+    Rectangle,
+    /// The size's two numbers are its axes.
+    Ellipse,
 }
 
 /// A light as one frame sees it.
@@ -44,10 +65,23 @@ pub struct PosedLight {
     pub position: DVec3,
     /// Unit direction in which it shines.
     pub direction: DVec3,
+    /// Unit direction of its node's X; only area lights care.
+    pub right: DVec3,
     /// Colour times intensity; zero while its node is hidden.
     pub intensity: Vec3,
+    /// See [`Light::size`].
+    pub size: f32,
     /// See [`Light::range`].
     pub range: Option<f32>,
+}
+
+impl Scene {
+    /// True if light number `light` has a size, now or at some time: its shadows are soft.
+    pub fn light_has_size(&self, light: usize) -> bool {
+        let Light { kind, size, .. } = self.lights[light];
+        let grows = || self.channels.iter().any(|c| c.target == Target::LightSize(light));
+        matches!(kind, LightKind::Area { .. }) || size > 0.0 || grows()
+    }
 }
 
 /// What surrounds the scene: the background, and an ambient light on every surface.

@@ -19,7 +19,7 @@ mod timing;
 
 pub use camera::{Camera, CameraRay, Lens, Projection, View};
 pub use curve::{Channel, Curve, Interpolation, Target};
-pub use light::{Light, LightKind, PosedLight, World};
+pub use light::{Light, LightKind, Outline, PosedLight, World};
 pub use material::{AlphaMode, Material, NormalTexture, Volume};
 pub use mesh::{Instance, Mesh, MorphTarget, Skin};
 pub use pose::{LocalTransform, Node, Pose};

@@ -107,6 +107,12 @@ impl Scene {
                         *outer_cone = v[0] as f32;
                     }
                 }
+                Target::LightSize(l) => lights[l].size = v[0] as f32,
+                Target::LightArea(l) => {
+                    if let LightKind::Area { size, .. } = &mut lights[l].kind {
+                        *size = DVec2::from_slice(v).as_vec2();
+                    }
+                }
             }
         }
         let mut world_from_node: Vec<DAffine3> = Vec::with_capacity(self.nodes.len());
@@ -123,11 +129,15 @@ impl Scene {
         let lights = lights.iter().map(|light| {
             let world_from_light = world_from_node[light.node];
             let lit = if visible[light.node] { light.intensity } else { 0.0 };
+            let direction = world_from_light.transform_vector3(DVec3::NEG_Z).normalize_or(DVec3::NEG_Z);
+            let right = world_from_light.matrix3.x_axis;
             PosedLight {
                 kind: light.kind,
                 position: world_from_light.translation,
-                direction: world_from_light.transform_vector3(DVec3::NEG_Z).normalize_or(DVec3::NEG_Z),
+                direction,
+                right: right.reject_from(direction).normalize_or(direction.any_orthonormal_vector()),
                 intensity: light.color * lit,
+                size: light.size,
                 range: light.range,
             }
         });

@@ -1,6 +1,7 @@
 //! What a scene asks of the renderer, worked out once.
 
 use super::{AlphaMode, Scene, Target};
+use glam::Vec3;
 
 /// Features that a scene uses; stages and stored fields that none of them needs are left out.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -15,6 +16,10 @@ pub struct Requirements {
     pub refraction: bool,
     /// Nodes other than cameras and lights move, are deformed, appear or vanish.
     pub moving_objects: bool,
+    /// Lights have a size: their shadows are soft.
+    pub soft_lights: bool,
+    /// The world shines on everything.
+    pub ambient_light: bool,
     /// Lights move or change.
     pub changing_lights: bool,
     /// The lens changes.
@@ -37,6 +42,8 @@ impl Requirements {
                 may_be_smooth && !material.unlit && (material.specular > 0.0 || material.metallic > 0.0);
             needs.refraction |= material.transmission > 0.0 || material.alpha_mode == AlphaMode::Blend;
         }
+        needs.soft_lights = (0..scene.lights.len()).any(|l| scene.light_has_size(l));
+        needs.ambient_light = scene.world.color != Vec3::ZERO;
         let moved = scene.moved_nodes();
         needs.moving_objects = scene.instances.iter().any(|i| moved[i.node] || scene.is_deformed(i));
         needs.changing_lights = scene.lights.iter().any(|l| moved[l.node]);
@@ -46,7 +53,9 @@ impl Requirements {
                 | Target::LightIntensity(_)
                 | Target::LightRange(_)
                 | Target::LightInnerCone(_)
-                | Target::LightOuterCone(_) => needs.changing_lights = true,
+                | Target::LightOuterCone(_)
+                | Target::LightSize(_)
+                | Target::LightArea(_) => needs.changing_lights = true,
                 Target::CameraYfov(_)
                 | Target::CameraXmag(_)
                 | Target::CameraYmag(_)
@@ -64,6 +73,8 @@ impl Requirements {
             (self.alpha, "alpha"),
             (self.reflection, "reflection"),
             (self.refraction, "refraction"),
+            (self.soft_lights, "soft-lights"),
+            (self.ambient_light, "ambient-light"),
             (self.moving_objects, "moving-objects"),
             (self.changing_lights, "changing-lights"),
             (self.lens_change, "lens-change"),

@@ -53,6 +53,10 @@ pub struct Settings {
     pub exposure: f32,
     /// Depth of reflection and refraction.
     pub bounces: u32,
+    /// Shadow rays to each light that has a size.
+    pub light_samples: u32,
+    /// Rays to the world from each point, where there is one.
+    pub ambient_samples: u32,
     /// Cast a ray to every reused sample and count those that something hides.
     pub audit: bool,
     /// The camera to use throughout, instead of the scene's cuts.
@@ -74,10 +78,18 @@ impl Settings {
             transparent: false,
             exposure: 0.0,
             bounces: 4,
+            light_samples: 1,
+            ambient_samples: 0,
             audit: false,
             camera: None,
             jitter: None,
         }
+    }
+
+    /// What of this the tracer wants to know.
+    pub fn trace_options(&self) -> TraceOptions {
+        let &Self { bounces, light_samples, ambient_samples, .. } = self;
+        TraceOptions { bounces, light_samples, ambient_samples }
     }
 }
 
@@ -183,7 +195,7 @@ fn render_segment(
     let origin = shot(scene, settings, segment.key).view.eye;
     accel.place(scene, &pose, origin);
     let accel = &*accel;
-    let tracer = Tracer::new(scene, accel, &pose, TraceOptions { bounces: settings.bounces });
+    let tracer = Tracer::new(scene, accel, &pose, settings.trace_options());
     buffers.fit(settings.window, tracer.lit_words());
     let mut emitter =
         Emitter { scene, settings, accel, tracer: &tracer, origin, cuts, wanted, sink, observer };

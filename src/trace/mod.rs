@@ -1,4 +1,4 @@
-//! Tracing as Whitted did: one ray through a pixel, one shadow ray to each light, mirrored and refracted rays on from
+//! Tracing as Whitted did: one ray through a pixel, shadow rays to each light, mirrored and refracted rays on from
 //! there. `docs/shading.md` has the model, its formulas and its cut-offs.
 //!
 //! The work is split as the paper splits it. [`Tracer::cast`] finds what does not depend on the eye and takes rays to
@@ -7,11 +7,15 @@
 //! sample and its shadow bits alone, whether the sample was just cast or carried over from another frame: so a still
 //! camera gives the same values frame after frame.
 
+mod form_factor;
 mod ggx;
 mod interaction;
 mod light;
 mod point;
+mod reach;
+mod sequence;
 mod surface;
+mod visibility;
 mod whitted;
 mod world;
 
@@ -20,26 +24,31 @@ use crate::frame::{PackedNormal, RayCounts, SurfaceSample};
 use crate::scene::{Pose, Scene, View};
 use glam::Vec3;
 use interaction::{Beam, SurfaceInteraction};
-use light::{Arriving, Emitter};
+use light::Emitter;
 use point::{Side, SurfacePoint};
 use std::f32::consts::FRAC_1_PI;
 use surface::{Surface, occlusion};
-use whitted::Path;
+use visibility::{Field, Layout};
+use whitted::{Incoming, Path};
 use world::Surroundings;
 
 /// Something this much nearer than a sample, as a share of its distance, hides it.
 const HIDING_SHARE: f32 = 1e-3;
 
-/// How deep to trace.
+/// How deep and how finely to trace.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct TraceOptions {
     /// Mirrored and refracted rays in a row, at most.
     pub bounces: u32,
+    /// Shadow rays to each light that has a size.
+    pub light_samples: u32,
+    /// Rays to the world, where there is one; without any its light reaches everything.
+    pub ambient_samples: u32,
 }
 
 impl Default for TraceOptions {
     fn default() -> Self {
-        Self { bounces: 4 }
+        Self { bounces: 4, light_samples: 1, ambient_samples: 0 }
     }
 }
 
@@ -69,6 +78,7 @@ pub struct Tracer<'a> {
     accel: &'a Accel,
     options: TraceOptions,
     lights: Vec<Emitter>,
+    layout: Layout,
     world: Surroundings<'a>,
 }
 
@@ -106,18 +116,19 @@ impl<'a> Tracer<'a> {
     /// A tracer of `scene` as `accel` has it placed, under the lights of `pose`.
     pub fn new(scene: &'a Scene, accel: &'a Accel, pose: &'a Pose, options: TraceOptions) -> Self {
         let lights = pose.lights.iter().map(|l| Emitter::new(l, accel.origin())).collect();
-        Self { scene, accel, options, lights, world: Surroundings::new(scene) }
+        let layout = Layout::new(scene, options);
+        Self { scene, accel, options, lights, layout, world: Surroundings::new(scene) }
     }
 
-    /// Words of 32 shadow bits that a sample needs: one bit for each light.
+    /// Words of 32 shadow bits that a sample needs; see [`lit_words`].
     pub fn lit_words(&self) -> usize {
-        self.lights.len().div_ceil(32)
+        self.layout.words
     }
 
-    /// Casts a ray from the eye through raster position (x, y), and from what it meets one to every light that could
-    /// shine there. Sets the bits in `lit` of those that do and clears all others.
+    /// Casts a ray from the eye through raster position (x, y), and from what it meets rays to every light that could
+    /// shine there. Says in `lit` which do.
     ///
-    /// The ray starts at the view's near plane and ends at its far plane. Counts `primary` and `shadow`.
+    /// The ray starts at the view's near plane and ends at its far plane. Counts `primary`, `shadow` and `ambient`.
     pub fn cast(&self, view: &View, x: f64, y: f64, lit: &mut [u32], rays: &mut RayCounts) -> SurfaceSample {
         lit.fill(0);
         let (sample, point) = self.first_hit(view, x, y, rays);
@@ -132,13 +143,13 @@ impl<'a> Tracer<'a> {
         self.first_hit(view, x, y, rays).0
     }
 
-    /// Finds out anew whether the lights whose bits are set in `ask` reach a sample, and sets or clears their bits in
-    /// `lit`. Counts `shadow`.
+    /// Finds out anew whether the lights of which any bit is set in `ask` reach a sample, and sets or clears their bits
+    /// in `lit`. Counts `shadow` and `ambient`.
     pub fn recast(&self, sample: &SurfaceSample, ask: &[u32], lit: &mut [u32], rays: &mut RayCounts) {
         if !sample.surface.is_background() {
             let side = Side::Towards(sample.normal.get());
             let point = SurfacePoint::new(self.scene, self.accel, sample.surface, side);
-            self.look_for_lights(&point, |light| is_lit(ask, light), lit, rays);
+            self.look_for_lights(&point, |field| field.is_set(ask), lit, rays);
         }
     }
 
@@ -202,24 +213,22 @@ impl<'a> Tracer<'a> {
         }
     }
 
-    /// Casts a ray to each light that is `asked` for and could shine on the point: in range, within its cone, and in
-    /// front of the surface itself. Whether a bumped or smoothed normal faces it does not matter here: what reaches the
-    /// point must not depend on what textures say under one eye's beam.
+    /// Casts rays to each light that is `asked` for and could shine on the point, and to the world.
     fn look_for_lights(
         &self,
         point: &SurfacePoint,
-        asked: impl Fn(usize) -> bool,
+        asked: impl Fn(Field) -> bool,
         lit: &mut [u32],
         rays: &mut RayCounts,
     ) {
-        for (i, light) in self.lights.iter().enumerate().filter(|(i, _)| asked(*i)) {
-            let (word, bit) = (i / 32, 1 << (i % 32));
-            lit[word] &= !bit;
-            let arriving = light.arriving(point.position).filter(|a| point.geometric.dot(a.to_light) > 0.0);
-            if let Some(arriving) = arriving.filter(|_| !point.material.unlit) {
-                rays.shadow += 1;
-                lit[word] |= if self.reaches(point, &arriving) { bit } else { 0 };
-            }
+        let looks = !point.material.unlit;
+        for (number, &field) in self.layout.lights.iter().enumerate().filter(|(_, field)| asked(**field)) {
+            let share = if looks { self.light_share(point, number, || rays.shadow += 1) } else { 0.0 };
+            field.set(lit, share);
+        }
+        if let Some(field) = self.layout.ambient.filter(|field| asked(*field)) {
+            let share = if looks { self.world_share(point, || rays.ambient += 1) } else { 0.0 };
+            field.set(lit, share);
         }
     }
 
@@ -235,20 +244,19 @@ impl<'a> Tracer<'a> {
         let (toward, beam) = eye.seen_from(sample.position);
         let it = self.interaction(sample, toward, beam);
         let surface = Surface::new(&it);
-        let (mut irradiance, mut highlights) = (Vec3::ZERO, Vec3::ZERO);
+        let mut incoming = Incoming::default();
         if !it.point.material.unlit {
-            irradiance = self.ambient(&it);
-            for (i, light) in self.lights.iter().enumerate() {
-                if is_lit(lit, i)
-                    && let Some(arriving) = self.facing(&it, light)
+            incoming = self.skylight(&it, self.layout.ambient.map_or(1.0, |field| field.share(lit)));
+            for (light, field) in self.lights.iter().zip(&self.layout.lights) {
+                if field.is_set(lit)
+                    && let Some(unshadowed) = light.unshadowed(it.point.position, it.normal)
                 {
-                    irradiance += arriving.irradiance;
-                    highlights += surface.highlight(&it, toward, &arriving);
+                    incoming.add(&it, &surface, toward, light, &unshadowed, field.share(lit));
                 }
             }
         }
         let path = Path::new(beam);
-        let seen = self.leaving(&it, &surface, toward, irradiance, highlights, &path, rays);
+        let seen = self.leaving(&it, &surface, toward, &incoming, &path, rays);
         Radiance {
             diffuse: finite(seen.diffuse),
             specular: finite(seen.specular),
@@ -267,18 +275,20 @@ impl<'a> Tracer<'a> {
         self.interaction(sample, toward, beam).normal
     }
 
-    /// The share of a sample's diffuse radiance that light number `light` brings, if its bit in `lit` is set.
+    /// The part of a sample's diffuse radiance that light number `light` brings, as far as it reaches it by `lit`.
     pub fn light_diffuse(&self, view: &View, sample: &SurfaceSample, lit: &[u32], light: usize) -> Vec3 {
-        if sample.surface.is_background() || !is_lit(lit, light) {
+        let share = self.layout.lights.get(light).map_or(0.0, |field| field.share(lit));
+        if sample.surface.is_background() || share == 0.0 {
             return Vec3::ZERO;
         }
         let (toward, beam) = self.eye(view).seen_from(sample.position);
         let it = self.interaction(sample, toward, beam);
-        let Some(arriving) = self.lights.get(light).and_then(|l| self.facing(&it, l)) else {
+        let Some(unshadowed) = self.lights[light].unshadowed(it.point.position, it.normal) else {
             return Vec3::ZERO;
         };
         let surface = Surface::new(&it);
-        finite(surface.albedo * arriving.irradiance * FRAC_1_PI * self.coverage(&surface, 0))
+        let irradiance = unshadowed.irradiance * share;
+        finite(surface.albedo * irradiance * FRAC_1_PI * self.coverage(&surface, 0))
     }
 
     /// True if something stands between the eye and a sample, nearer by more than a thousandth of its distance; for
@@ -318,31 +328,20 @@ impl<'a> Tracer<'a> {
         SurfaceInteraction::new(self.scene, self.accel, sample.surface, side, toward, beam)
     }
 
-    /// What arrives from a light that is in front of the surface, Lambert's cosine included.
-    fn facing(&self, it: &SurfaceInteraction, light: &Emitter) -> Option<Arriving> {
-        let mut arriving = light.arriving(it.point.position)?;
-        let cos = it.normal.dot(arriving.to_light);
-        if cos <= 0.0 || it.point.geometric.dot(arriving.to_light) <= 0.0 {
-            return None;
+    /// What arrives from the world, of which `share` reaches the point.
+    fn skylight(&self, it: &SurfaceInteraction, share: f32) -> Incoming {
+        if self.world.is_black() {
+            return Incoming::default();
         }
-        arriving.irradiance *= cos;
-        Some(arriving)
-    }
-
-    /// Whether nothing stands in the light's way. Stops a little before the light, which may itself stand on a surface.
-    fn reaches(&self, point: &SurfacePoint, arriving: &Arriving) -> bool {
-        let from = point.start(arriving.to_light);
-        self.accel.unoccluded(self.scene, from, arriving.to_light, arriving.distance * (1.0 - 1e-4))
-    }
-
-    /// Irradiance from the world.
-    fn ambient(&self, it: &SurfaceInteraction) -> Vec3 {
-        if self.world.is_black() { Vec3::ZERO } else { self.world.irradiance(it.normal) * occlusion(it) }
+        let openness = occlusion(it) * share;
+        Incoming { irradiance: self.world.irradiance(it.normal) * openness, openness, ..Incoming::default() }
     }
 }
 
-fn is_lit(lit: &[u32], light: usize) -> bool {
-    lit.get(light / 32).is_some_and(|word| word >> (light % 32) & 1 != 0)
+/// Words of 32 shadow bits that a sample of `scene` needs: a bit for each light; eight, a share, for each that has a size if
+/// several rays are cast to it; and eight for the world if any is cast to that.
+pub fn lit_words(scene: &Scene, options: TraceOptions) -> usize {
+    Layout::new(scene, options).words
 }
 
 /// `light`, or nothing where arithmetic on extreme input has overflowed: one such pixel would spoil every filter

@@ -1,5 +1,6 @@
 //! A point on a surface: where it is and which way the surface lies, before any texture is asked.
 
+use super::sequence::hash;
 use crate::accel::{Accel, interpolate};
 use crate::frame::SurfaceRef;
 use crate::scene::{Material, Mesh, Scene};
@@ -25,6 +26,7 @@ pub(super) struct SurfacePoint<'a> {
     pub front: bool,
     /// Metres to stay away from the surface.
     offset: f32,
+    surface: SurfaceRef,
 }
 
 /// Which side of a surface is looked at.
@@ -63,7 +65,14 @@ impl<'a> SurfacePoint<'a> {
             + m.translation.abs();
         let offset =
             (magnitude.max_element() + placement.fused_reach) * (OFFSET_ROUNDINGS * f32::EPSILON * 0.5);
-        Self { mesh, material, corners, weights, edges, position, geometric, front, offset }
+        Self { mesh, material, corners, weights, edges, position, geometric, front, offset, surface }
+    }
+
+    /// A number that says nothing but which point this is: what is left to chance here is decided by it, and so the
+    /// same in every frame that shows the point.
+    pub fn seed(&self) -> u32 {
+        let SurfaceRef { instance, primitive, u, v } = self.surface;
+        [primitive, u.to_bits(), v.to_bits()].into_iter().fold(instance, hash)
     }
 
     /// Where a ray in `direction` starts so that rounding does not make it meet its own surface.

@@ -2,14 +2,14 @@
 
 use super::ggx::{environment_share, lobe, refract};
 use super::interaction::{Beam, SurfaceInteraction};
-use super::light::Arriving;
+use super::light::{Emitter, GRID, Unshadowed};
 use super::point::Side;
-use super::surface::{Surface, occlusion};
+use super::surface::Surface;
 use super::{Radiance, Tracer};
 use crate::accel::Sides;
 use crate::frame::RayCounts;
 use glam::Vec3;
-use std::f32::consts::FRAC_1_PI;
+use std::f32::consts::{FRAC_1_PI, TAU};
 
 /// A ray is followed only if it carries more than this share of what it finds to the pixel.
 const MIN_SHARE: f32 = 1.0 / 256.0;
@@ -60,37 +60,77 @@ impl Path {
     }
 }
 
+/// What arrives at a point, and what of it is mirrored to the eye.
+#[derive(Default)]
+pub(super) struct Incoming {
+    /// Of all lights and the world.
+    pub irradiance: Vec3,
+    /// Of the lights, as radiance.
+    pub highlights: Vec3,
+    /// Share of the world's light that reaches the point.
+    pub openness: f32,
+}
+
+impl Incoming {
+    /// Adds the `share` of a light that reaches the point.
+    pub fn add(
+        &mut self,
+        it: &SurfaceInteraction,
+        surface: &Surface,
+        toward: Vec3,
+        light: &Emitter,
+        unshadowed: &Unshadowed,
+        share: f32,
+    ) {
+        self.irradiance += unshadowed.irradiance * share;
+        self.highlights += surface.highlight(it, toward, light, unshadowed) * share;
+    }
+}
+
 impl Surface {
-    /// The highlight of a light, its cosine already in `arriving`.
-    pub fn highlight(&self, it: &SurfaceInteraction, toward: Vec3, arriving: &Arriving) -> Vec3 {
+    /// The highlight of a light, nothing in its way.
+    fn highlight(
+        &self,
+        it: &SurfaceInteraction,
+        toward: Vec3,
+        light: &Emitter,
+        unshadowed: &Unshadowed,
+    ) -> Vec3 {
         // Inside a solid, and where nothing is reflected, there is none.
         if self.f90 == 0.0 || self.eta.is_some_and(|eta| eta < 1.0) {
             return Vec3::ZERO;
         }
-        match lobe(it.normal, toward, arriving.to_light, self.alpha(), MIN_LOBE) {
-            Some((lobe, cos)) => arriving.irradiance * lobe * self.fresnel(cos),
+        let mirrored = |alpha: f32, to_light: Vec3| match lobe(it.normal, toward, to_light, alpha, MIN_LOBE) {
+            Some((lobe, cos)) => unshadowed.irradiance * lobe * self.fresnel(cos),
             None => Vec3::ZERO,
+        };
+        let alpha = self.alpha();
+        if !light.has_size() {
+            return mirrored(alpha, unshadowed.to_light);
         }
+        // A light is cut in parts narrower than the lobe, as far as a few will do, and the lobe is widened by their size.
+        let spread = light.solid_angle(it.point.position) / TAU;
+        let rows = (4.0 * spread.sqrt() / alpha).ceil().clamp(1.0, GRID as f32);
+        let alpha = (alpha * alpha + spread / (rows * rows)).sqrt();
+        light.mean(it.point.position, it.normal, rows as u32, |to_light| mirrored(alpha, to_light))
     }
 }
 
 impl Tracer<'_> {
     /// What leaves `it` along `toward`, given what arrives there.
-    #[expect(clippy::too_many_arguments, reason = "what is known of the point, and how it is reached")]
     pub(super) fn leaving(
         &self,
         it: &SurfaceInteraction,
         surface: &Surface,
         toward: Vec3,
-        irradiance: Vec3,
-        highlights: Vec3,
+        incoming: &Incoming,
         path: &Path,
         rays: &mut RayCounts,
     ) -> Radiance {
         let coverage = self.coverage(surface, path.bounces);
-        let mut specular = highlights;
+        let mut specular = incoming.highlights;
         if surface.f90 > 0.0 || surface.eta.is_some() {
-            specular += self.mirrored(it, surface, toward, coverage, path, rays);
+            specular += self.mirrored(it, surface, toward, incoming.openness, coverage, path, rays);
         }
         if surface.transmittance != Vec3::ZERO {
             specular += self.transmitted(it, surface, toward, coverage, path, rays);
@@ -102,7 +142,7 @@ impl Tracer<'_> {
                 share * self.follow(it, -toward, path, path.next(Kind::Refraction, share, path.inside), rays);
         }
         Radiance {
-            diffuse: surface.albedo * irradiance * (FRAC_1_PI * coverage),
+            diffuse: surface.albedo * incoming.irradiance * (FRAC_1_PI * coverage),
             specular,
             emission: surface.emission * coverage,
             alpha: 1.0,
@@ -116,11 +156,13 @@ impl Tracer<'_> {
     }
 
     /// What the surface mirrors of other things: sharp where smooth, the world's blurred light where rough.
+    #[expect(clippy::too_many_arguments, reason = "what is known of the point, and how it is reached")]
     fn mirrored(
         &self,
         it: &SurfaceInteraction,
         surface: &Surface,
         toward: Vec3,
+        openness: f32,
         coverage: f32,
         path: &Path,
         rays: &mut RayCounts,
@@ -144,7 +186,7 @@ impl Tracer<'_> {
         if sharp < 1.0 && !self.world.is_black() {
             let share = environment_share(surface.f0, surface.f90, surface.roughness, cos) * (1.0 - sharp);
             let angle = 2.0 * surface.roughness * surface.roughness;
-            light += share * self.world.radiance(direction, angle) * occlusion(it);
+            light += share * self.world.radiance(direction, angle) * openness;
         }
         light
     }
@@ -206,20 +248,21 @@ impl Tracer<'_> {
         let side = Side::Front(hit.front);
         let it = SurfaceInteraction::new(self.scene, self.accel, hit.surface, side, -direction, path.beam);
         let surface = Surface::new(&it);
-        let (mut irradiance, mut highlights) = (Vec3::ZERO, Vec3::ZERO);
+        let mut incoming = Incoming::default();
         if !it.point.material.unlit {
-            irradiance = self.ambient(&it);
-            for light in &self.lights {
-                if let Some(arriving) = self.facing(&it, light) {
-                    path.count(rays);
-                    if self.reaches(&it.point, &arriving) {
-                        irradiance += arriving.irradiance;
-                        highlights += surface.highlight(&it, -direction, &arriving);
+            let ambient =
+                self.layout.ambient.map_or(1.0, |_| self.world_share(&it.point, || path.count(rays)));
+            incoming = self.skylight(&it, ambient);
+            for (number, light) in self.lights.iter().enumerate() {
+                if let Some(unshadowed) = light.unshadowed(it.point.position, it.normal) {
+                    let share = self.light_share(&it.point, number, || path.count(rays));
+                    if share > 0.0 {
+                        incoming.add(&it, &surface, -direction, light, &unshadowed, share);
                     }
                 }
             }
         }
-        passed * self.leaving(&it, &surface, -direction, irradiance, highlights, &path, rays).total()
+        passed * self.leaving(&it, &surface, -direction, &incoming, &path, rays).total()
     }
 }
 

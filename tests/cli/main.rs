@@ -9,6 +9,7 @@ mod pipes;
 mod refusals;
 mod resume;
 mod rig;
+mod soft;
 mod stage;
 mod stopping;
 mod whole;

@@ -146,7 +146,7 @@ fn two_mirrors_reflect_as_often_as_allowed() {
     add_plane(&mut scene, mirror(), 10.0, upside_down(8.0));
     for bounces in 0..6 {
         let mut rig = Rig::new(scene.clone());
-        rig.bounces = bounces;
+        rig.options.bounces = bounces;
         let pixel = rig.center();
         assert_eq!(pixel.rays.reflection, u64::from(bounces));
         assert!(close(pixel.radiance.total(), Vec3::splat(1.0 + (bounces / 2) as f32)));

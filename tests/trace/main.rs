@@ -4,4 +4,5 @@ mod eye;
 mod light;
 mod rig;
 mod robust;
+mod soft;
 mod solid;

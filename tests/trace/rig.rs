@@ -11,7 +11,7 @@ pub struct Rig {
     pub scene: Scene,
     pub pose: Pose,
     pub accel: Accel,
-    pub bounces: u32,
+    pub options: TraceOptions,
 }
 
 /// Everything that a pixel came to.
@@ -32,11 +32,11 @@ impl Rig {
         let pose = scene.pose(0.0);
         let mut accel = Accel::new(&scene);
         accel.place(&scene, &pose, origin);
-        Self { scene, pose, accel, bounces: 4 }
+        Self { scene, pose, accel, options: TraceOptions::default() }
     }
 
     pub fn tracer(&self) -> Tracer<'_> {
-        Tracer::new(&self.scene, &self.accel, &self.pose, TraceOptions { bounces: self.bounces })
+        Tracer::new(&self.scene, &self.accel, &self.pose, self.options)
     }
 
     pub fn view(&self) -> View {

@@ -1,0 +1,139 @@
+//! How a sample's shadow words are laid out: a bit for each light without size, eight bits for the share of each other
+//! light, and of the world, that reaches the point.
+
+use super::TraceOptions;
+use crate::scene::Scene;
+use glam::Vec3;
+
+/// Where in the words of every sample each light is found.
+#[derive(Debug, Clone)]
+pub(super) struct Layout {
+    /// In the lights' order.
+    pub lights: Vec<Field>,
+    /// The world's, where ambient rays are cast.
+    pub ambient: Option<Field>,
+    /// Words of a sample.
+    pub words: usize,
+}
+
+/// One light's bits, all in one word.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Field {
+    word: usize,
+    shift: usize,
+    /// The number that stands for all of the light: 1 or 255.
+    whole: u32,
+}
+
+impl Layout {
+    /// The layout for `scene`: single bits first, in the lights' order, then shares. A single ray has nothing to share.
+    pub fn new(scene: &Scene, options: TraceOptions) -> Self {
+        let is_soft = |light: usize| options.light_samples > 1 && scene.light_has_size(light);
+        let mut lights = vec![Field::default(); scene.lights.len()];
+        let mut bits = 0;
+        for light in (0..lights.len()).filter(|&l| !is_soft(l)) {
+            lights[light] = Field::at(&mut bits, 1);
+        }
+        for light in (0..lights.len()).filter(|&l| is_soft(l)) {
+            lights[light] = Field::at(&mut bits, 8);
+        }
+        let has_ambient = options.ambient_samples > 0 && scene.world.color != Vec3::ZERO;
+        let ambient = has_ambient.then(|| Field::at(&mut bits, 8));
+        Self { lights, ambient, words: bits.div_ceil(32) }
+    }
+}
+
+impl Field {
+    /// The next field of `width` bits after `bits`, at a multiple of its width.
+    fn at(bits: &mut usize, width: usize) -> Self {
+        let start = bits.next_multiple_of(width);
+        *bits = start + width;
+        Self { word: start / 32, shift: start % 32, whole: (1 << width) - 1 }
+    }
+
+    /// The share in the words of a sample: 0 is none of the light, 1 all of it.
+    pub fn share(self, words: &[u32]) -> f32 {
+        (self.bits(words) as f32) / self.whole as f32
+    }
+
+    /// Stores a share.
+    pub fn set(self, words: &mut [u32], share: f32) {
+        let bits = (share * self.whole as f32).round() as u32;
+        words[self.word] &= !(self.whole << self.shift);
+        words[self.word] |= bits.min(self.whole) << self.shift;
+    }
+
+    /// Whether any of its bits is set in `words`.
+    pub fn is_set(self, words: &[u32]) -> bool {
+        self.bits(words) != 0
+    }
+
+    fn bits(self, words: &[u32]) -> u32 {
+        words.get(self.word).map_or(0, |word| word >> self.shift & self.whole)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::LightKind;
+    use glam::DAffine3;
+
+    fn scene(sizes: &[f32]) -> Scene {
+        let mut scene = Scene::default();
+        for &size in sizes {
+            let light = scene.add_light(LightKind::Point, 1.0, DAffine3::IDENTITY);
+            scene.lights[light].size = size;
+        }
+        scene
+    }
+
+    #[test]
+    fn every_light_has_bits_of_its_own() {
+        let mut scene = scene(&[0.1; 40]);
+        scene.lights.iter_mut().step_by(3).for_each(|l| l.size = 0.0);
+        scene.world.color = Vec3::ONE;
+        let options = TraceOptions { light_samples: 4, ambient_samples: 2, ..TraceOptions::default() };
+        let layout = Layout::new(&scene, options);
+        let fields = || layout.lights.iter().copied().chain(layout.ambient);
+        let mut words = vec![0; layout.words];
+        for (i, field) in fields().enumerate() {
+            assert!(!field.is_set(&words), "{i}");
+            field.set(&mut words, 1.0);
+        }
+        // 14 single bits, then 27 bytes.
+        assert_eq!((words.len(), words.iter().map(|w| w.count_ones()).sum::<u32>()), (8, 14 + 27 * 8));
+        for field in fields() {
+            assert_eq!(field.share(&words), 1.0);
+            field.set(&mut words, 0.0);
+            assert_eq!(field.share(&words), 0.0);
+        }
+        assert!(words.iter().all(|&w| w == 0));
+    }
+
+    #[test]
+    fn a_share_is_kept_to_half_a_step() {
+        let options = TraceOptions { light_samples: 2, ..TraceOptions::default() };
+        let field = Layout::new(&scene(&[0.1]), options).lights[0];
+        let mut words = [u32::MAX];
+        for share in [0.0, 1e-4, 0.25, 0.5, 0.7, 1.0] {
+            field.set(&mut words, share);
+            assert!((field.share(&words) - share).abs() <= 0.5 / 255.0 + 1e-6);
+            assert_eq!(words[0] >> 8, 0xff_ffff, "others keep theirs");
+        }
+    }
+
+    #[test]
+    fn shares_are_kept_only_where_several_rays_are_cast() {
+        let mut scene = scene(&[0.0, 0.1]);
+        scene.world.color = Vec3::ONE;
+        let words = |light_samples, ambient_samples| {
+            let options = TraceOptions { light_samples, ambient_samples, ..TraceOptions::default() };
+            let layout = Layout::new(&scene, options);
+            (layout.lights.iter().map(|f| f.whole).collect::<Vec<_>>(), layout.ambient.is_some())
+        };
+        assert_eq!(words(1, 0), (vec![1, 1], false));
+        assert_eq!(words(2, 0), (vec![1, 255], false));
+        assert_eq!(words(1, 1), (vec![1, 1], true));
+    }
+}

@@ -1,0 +1,98 @@
+//! Soft light from the outside: what options do, and that nothing depends on how the work is cut up.
+
+use crate::rig::{assert_same_bytes, buzz, channels, frames_in, fresh, json, run};
+use crate::stage::{CAMERA, Stage};
+use serde_json::{Value, json};
+
+/// The stage under a large lamp and a sky.
+fn softly_lit(mut stage: Stage) -> Stage {
+    stage.json["extensions"]["KHR_lights_punctual"]["lights"][0]["extras"] = json!({"radius": 0.5});
+    stage.json["scenes"][0]["extras"] = json!({"buzz": {"world": {"color": [0.5, 0.6, 0.7]}}});
+    stage
+}
+
+const SOFT: &str = "-r 64x36 --aov all --light-samples 8 --ambient-samples 4";
+
+#[test]
+fn a_still_camera_gives_the_same_values_in_soft_light() {
+    for quality in ["half-pixel", "full"] {
+        let (folder, out) = fresh();
+        let mut stage = softly_lit(Stage::new());
+        stage.translate(CAMERA, &[[0.3, 1.1, 6.0]; 4]);
+        let scene = stage.write(&folder.path().join("s.gltf"));
+        run(&scene, &out, &format!("{SOFT} -q {quality}")).ok();
+        let names = frames_in(&out);
+        assert_eq!(names.len(), 4);
+        let first = channels(&out.join(&names[0]));
+        for name in &names[1..] {
+            for (channel, values) in channels(&out.join(name)) {
+                assert!(channel == "pixelClass.id" || values == first[&channel], "{channel} of {name}");
+            }
+        }
+    }
+}
+
+#[test]
+fn soft_light_depends_on_neither_threads_nor_chunks() {
+    let (folder, out) = fresh();
+    let scene = softly_lit(Stage::drifting(8)).write(&folder.path().join("s.gltf"));
+    run(&scene, &out, &format!("{SOFT} -j 2")).ok();
+    let parts = folder.path().join("parts");
+    for range in ["0-2", "3-3", "4-7"] {
+        run(&scene, &parts, &format!("{SOFT} -j 1 -f {range}")).ok();
+    }
+    assert_eq!(assert_same_bytes(&parts, &out), 8);
+}
+
+#[test]
+fn rays_to_lights_and_sky_are_counted_and_saved() {
+    let (folder, out) = fresh();
+    let scene = softly_lit(Stage::drifting(8)).write(&folder.path().join("s.gltf"));
+    // Rays to the lamp and to the sky.
+    let rays = |options: &str| -> [u64; 2] {
+        run(&scene, &out, &format!("-r 64x36 --overwrite {options}")).ok();
+        let rays = &json(&out.join("report.json"))["totals"]["rays"];
+        ["shadow", "ambient"].map(|kind| rays[kind].as_u64().unwrap())
+    };
+    let many = "--light-samples 8 --ambient-samples 4";
+    let (one, full, inferred) = (rays("-q full"), rays(&format!("-q full {many}")), rays(many));
+    // All that is seen faces all of the lamp, or nearly.
+    assert_eq!(one[1], 0);
+    assert!(full[0] > 7 * one[0] && full[0] <= 8 * one[0], "{full:?} {one:?}");
+    assert!(full[1] >= 4 * one[0]);
+    assert!(2 * inferred[0] < full[0] && 2 * inferred[1] < full[1], "{full:?} {inferred:?}");
+}
+
+#[test]
+fn samples_are_settings_like_others() {
+    let (folder, out) = fresh();
+    let scene = softly_lit(Stage::drifting(2)).write(&folder.path().join("s.gltf"));
+    let skipped = |options: &str| {
+        run(&scene, &out, &format!("-r 16x9 --skip-existing {options}")).ok();
+        json(&out.join("report.json"))["frames"][0]["skipped"] == true
+    };
+    assert!(!skipped("--light-samples 4"));
+    assert!(skipped("--light-samples 4"));
+    assert!(!skipped("--light-samples 5"));
+    assert!(!skipped("--light-samples 5 --ambient-samples 1"));
+    for bad in ["--light-samples 0", "--light-samples -1", "--light-samples 5000", "--ambient-samples -1"] {
+        run(&scene, &out, bad).refused(2, &["samples"]);
+    }
+}
+
+#[test]
+fn an_inspection_names_sizes_of_lights() {
+    let (folder, _) = fresh();
+    let mut stage = softly_lit(Stage::new());
+    stage.json["extensions"]["KHR_lights_punctual"]["lights"][0]["type"] = json!("spot");
+    stage.json["extensions"]["KHR_lights_punctual"]["lights"][0]["extras"] =
+        json!({"area": {"shape": "ellipse", "size": [2, 1]}});
+    let path = stage.write(&folder.path().join("s.gltf"));
+    let text = buzz(["inspect", path.to_str().unwrap()]).ok().out;
+    assert!(text.contains("light: Lamp (ellipse 2 x 1)"), "{text}");
+    assert!(text.contains("requires: soft-lights, ambient-light"), "{text}");
+    let text = buzz(["inspect", path.to_str().unwrap(), "--format", "json"]).ok().out;
+    let scene: Value = serde_json::from_str(&text).unwrap();
+    assert_eq!(scene["lights"], json!([{"name": "Lamp", "type": "ellipse", "size": [2.0, 1.0]}]));
+    assert_eq!(scene["ignored"], json!([]));
+}
