@@ -30,7 +30,8 @@ def build():
     materials = make_materials(scene)
     for part in (ground, buildings, roofs, tower, fountain, well, greenery, furniture, lanterns):
         part(scene, materials)
-    scene.sun("Sun", direction=(0.55, -0.75, -0.42), watts_per_m2=3.7, colour=(1.0, 0.91, 0.78))
+    # As large as the real one.
+    scene.sun("Sun", direction=(0.55, -0.75, -0.42), watts_per_m2=3.7, colour=(1.0, 0.91, 0.78), angle=0.00925)
     move_camera(scene)
     return scene
 
@@ -546,7 +547,7 @@ def lanterns(scene, materials):
     for name, x in (("west", -2.0), ("east", 6.0)):
         place = np.array([x, 2.9, -NORTH + 0.42])
         scene.node(f"Lantern {name}", place, mesh=lantern)
-        scene.lamp(f"Lamp {name}", place + [0, -0.02, 0], watts=60, colour=(1.0, 0.68, 0.36))
+        scene.lamp(f"Lamp {name}", place + [0, -0.02, 0], watts=60, colour=(1.0, 0.68, 0.36), radius=0.04)
 
 
 # ---- sky and camera

@@ -309,7 +309,7 @@ def lamps(scene, materials):
     pendant = scene.mesh("Pendant", (globe, materials["glow"]), (rod, materials["iron"]))
     for name, z in (("near", 3.2), ("far", -4.6)):
         scene.node(f"Pendant {name}", (0, 3.4, z), mesh=pendant)
-        scene.lamp(f"Lamp {name}", (0, 3.22, z), watts=260, colour=(1.0, 0.90, 0.76))
+        scene.lamp(f"Lamp {name}", (0, 3.22, z), watts=260, colour=(1.0, 0.90, 0.76), radius=0.05)
     can = lathe([(0.05, -0.09), (0.06, -0.09), (0.06, -0.09), (0.06, 0.09), (0.06, 0.09), (0.0, 0.11)], 24)
     spot = scene.mesh("Spot", (can, materials["iron"]))
     for name, place, target in (
@@ -318,7 +318,7 @@ def lamps(scene, materials):
     ):
         place, direction = np.array(place), unit(np.array(target) - place)
         scene.node(f"Spot {name}", place, rotation=upright_to(-direction), mesh=spot)
-        scene.spot(f"Spot light {name}", place + 0.12 * direction, direction, watts=420, cone=(18, 34))
+        scene.spot(f"Spot light {name}", place + 0.12 * direction, direction, watts=420, cone=(18, 34), radius=0.03)
 
 
 def upright_to(direction):

@@ -178,22 +178,23 @@ class Scene:
         self.document["scenes"][0]["nodes"].append(index)
         return index
 
-    def sun(self, name, direction, watts_per_m2, colour=(1, 1, 1)):
-        """Adds a directional light that shines along `direction`."""
-        light = {"type": "directional", "intensity": LUMENS_PER_WATT * watts_per_m2}
+    def sun(self, name, direction, watts_per_m2, colour=(1, 1, 1), angle=0.0):
+        """Adds a directional light that shines along `direction` and fills `angle` radians of the sky."""
+        light = {"type": "directional", "intensity": LUMENS_PER_WATT * watts_per_m2, **_size("angle", angle)}
         self._light(name, light, colour, rotation=_turn_minus_z_to(direction))
 
-    def lamp(self, name, position, watts, colour=(1, 1, 1)):
-        """Adds a point light of so many watts, as Blender counts them."""
-        light = {"type": "point", "intensity": LUMENS_PER_WATT * watts / (4 * np.pi)}
+    def lamp(self, name, position, watts, colour=(1, 1, 1), radius=0.0):
+        """Adds a point light of so many watts, as Blender counts them; with a radius, a sphere."""
+        light = {"type": "point", "intensity": LUMENS_PER_WATT * watts / (4 * np.pi), **_size("radius", radius)}
         self._light(name, light, colour, translation=position)
 
-    def spot(self, name, position, direction, watts, cone, colour=(1, 1, 1)):
+    def spot(self, name, position, direction, watts, cone, colour=(1, 1, 1), radius=0.0):
         """Adds a spot of so many watts, as Blender counts them, with inner and outer half-angles in degrees."""
         light = {
             "type": "spot",
             "intensity": LUMENS_PER_WATT * watts / (4 * np.pi),
             "spot": dict(zip(("innerConeAngle", "outerConeAngle"), _tidy(np.radians(cone)), strict=True)),
+            **_size("radius", radius),
         }
         self._light(name, light, colour, translation=position, rotation=_turn_minus_z_to(direction))
 
@@ -266,6 +267,11 @@ class Scene:
 def _tidy(numbers):
     """Plain numbers, rounded for the same reason as in `_accessor`."""
     return [round(float(n), 7) for n in numbers]
+
+
+def _size(key, value):
+    """A light's extras, where it has a size."""
+    return {"extras": {key: value}} if value else {}
 
 
 def _turn_minus_z_to(direction):
