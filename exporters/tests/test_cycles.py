@@ -125,6 +125,55 @@ def test_soft_and_large_lights(blender, export, buzz, tmp_path):
     assert np.median(edge) == pytest.approx(1, abs=0.06)
 
 
+SOFT = {
+    "sphere": ("POINT", {"energy": 400.0, "shadow_soft_size": 0.6, "use_soft_falloff": False, "location": (0.5, -1, 4)}, (0, 0, 0)),
+    "spot": (
+        "SPOT",
+        {"energy": 800.0, "shadow_soft_size": 0.5, "use_soft_falloff": False, "spot_size": 2.4, "spot_blend": 0.0, "location": (0, -1, 5)},
+        (0.2, 0, 0),
+    ),
+    "sun": ("SUN", {"energy": 3.0, "angle": 0.4}, (0.6, 0.3, 0.2)),
+    "rectangle": ("AREA", {"energy": 300.0, "shape": "RECTANGLE", "size": 2.0, "size_y": 1.0, "location": (0.5, -1, 4)}, (0.3, 0.2, 0.4)),
+    "ellipse": ("AREA", {"energy": 300.0, "shape": "ELLIPSE", "size": 2.0, "size_y": 1.0, "location": (0.5, -1, 3)}, (0.3, 0.2, 0.4)),
+}
+
+
+@pytest.mark.parametrize("kind", [*SOFT, "sky"])
+def test_soft_shadows(blender, export, buzz, tmp_path, kind):
+    """Penumbras on a floor under a cube, pixel by pixel. Blender's soft falloff makes spheres discs that face each point."""
+    import blender_scene as b
+    import render_tools as r
+
+    scene = blender.context.scene
+    scene.render.resolution_x, scene.render.resolution_y = 48, 27
+    scene.frame_start = scene.frame_end = 1
+    b.camera(location=(0, -7, 7), rotation=(0.8, 0, 0))
+    matt, _ = b.material("Matt", (0.5, 0.5, 0.5))
+    for thing in (b.plane("Floor", 40), b.cube("Cube", (0, 0, 1.2))):
+        thing.data.materials.append(matt)
+    if kind == "sky":
+        scene.world = blender.data.worlds.new("World")
+        scene.world.use_nodes = True
+        scene.world.node_tree.nodes["Background"].inputs["Color"].default_value = (0.8, 0.8, 0.8, 1)
+    else:
+        name, settings, rotation = SOFT[kind]
+        lamp = b.light(name, **settings)
+        lamp.rotation_euler = rotation
+        lamp.visible_camera = False
+    r.cycles_settings(blender)
+    scene.cycles.samples = 1024
+    cycles = r.rgb(r.cycles_render(blender, tmp_path / "cycles.exr"))[..., 0]
+    gltf = export()
+    buzz(gltf.path, tmp_path / "out", "-q", "full", "--light-samples", "256", "--ambient-samples", "256")
+    ours = r.rgb(r.read_exr(r.frames_of(tmp_path / "out")[1]))[..., 0]
+    brightest = np.quantile(cycles, 0.99)
+    off = np.abs(ours - cycles) / brightest
+    # Edges of the cube are silhouettes, measured elsewhere.
+    assert np.quantile(off, 0.98) < 0.02, f"{np.quantile(off, [0.5, 0.9, 0.98])}"
+    assert ours.mean() == pytest.approx(cycles.mean(), rel=0.005)
+    assert ((cycles > 0.1 * brightest) & (cycles < 0.7 * brightest)).sum() > 20
+
+
 @pytest.mark.parametrize("case", ["shift", "portrait vertical", "ortho", "pixel aspect", "23.976 cut"])
 def test_pictures_line_up(blender, export, buzz, tmp_path, case):
     """Silhouettes for each lens, at the frame after a cut too."""
