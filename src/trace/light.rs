@@ -12,6 +12,9 @@ const MIN_DISTANCE: f32 = 1e-4;
 /// An area light that covers less than this, in steradians, shines as if from its middle.
 const POINT_LIKE: f32 = 1e-6;
 
+/// A spot's cone that changes less than this over its sphere, before it is squared, is taken at the sphere's middle.
+const LEVEL_CONE: f32 = 0.05;
+
 /// Rows of the finest grid over a light by which its cone, or a highlight, is averaged.
 pub(super) const GRID: u32 = 4;
 
@@ -172,10 +175,15 @@ impl Emitter {
                 let distance = along.length();
                 let axis = along / distance;
                 let mut strength = self.falloff(distance, *radius);
-                strength *= disc_share(normal.dot(axis), (radius / distance).min(1.0));
-                if let Some(cone) = cone {
-                    let part = |u| sphere_part(u, axis, distance, *radius).0;
-                    strength *= cone.mean(normal, grid(GRID).map(part));
+                let sin = (radius / distance).min(1.0);
+                strength *= disc_share(normal.dot(axis), sin);
+                match cone {
+                    Some(cone) if cone.scale * sin > LEVEL_CONE => {
+                        let part = |u| sphere_part(u, axis, distance, *radius).0;
+                        strength *= cone.mean(normal, grid(GRID).map(part));
+                    }
+                    Some(cone) => strength *= cone.at(axis),
+                    None => {}
                 }
                 (strength, axis)
             }

@@ -3,8 +3,8 @@
 use crate::rig::*;
 use buzz::accel::{Accel, Sides};
 use buzz::frame::RayCounts;
-use buzz::scene::{LightKind, Material, Mesh, Pose, Scene, Skin};
-use glam::{DAffine3, DMat4, DQuat, DVec3, Vec3, Vec4};
+use buzz::scene::{LightKind, Material, Mesh, Outline, Pose, Scene, Skin};
+use glam::{DAffine3, DMat4, DQuat, DVec3, Vec2, Vec3, Vec4};
 use proptest::prelude::*;
 
 /// A rolling ground of `n` x `n` squares around the origin, made of exact and of rough coordinates.
@@ -163,7 +163,8 @@ fn the_parts_of_the_diffuse_light_add_up() {
 #[test]
 fn extreme_scenes_give_finite_numbers() {
     let everything = |scene: Scene, origin: DVec3| {
-        let rig = Rig::at(scene, origin);
+        let mut rig = Rig::at(scene, origin);
+        (rig.options.light_samples, rig.options.ambient_samples) = (4, 4);
         for y in [0.0, 10.5, 32.5, 50.1, 65.0] {
             for x in [0.0, 20.3, 32.5, 40.7, 65.0] {
                 let pixel = rig.pixel(x, y);
@@ -200,7 +201,19 @@ fn extreme_scenes_give_finite_numbers() {
     };
     let broken = scene.add_mesh(broken);
     scene.add_instance(broken, DAffine3::IDENTITY);
-    everything(scene, DVec3::ZERO);
+    everything(scene.clone(), DVec3::ZERO);
+    // All of them too small or too large; flat ones on the floor, in the eye, and out of all proportion.
+    for size in [1e-30, 1e-3, 1e3, 1e30, f32::MAX] {
+        let mut scene = scene.clone();
+        scene.lights.iter_mut().for_each(|light| light.size = size);
+        for (outline, place) in
+            [(Outline::Rectangle, down_from(0.0, 0.0, 0.0)), (Outline::Ellipse, at(0.0, 3.0, 7.0))]
+        {
+            scene.add_light(LightKind::Area { outline, size: Vec2::splat(size) }, 1.0, place);
+            scene.add_light(LightKind::Area { outline, size: Vec2::new(size, 1e-9) }, 1e3, upside_down(3.0));
+        }
+        everything(scene, DVec3::ZERO);
+    }
 }
 
 #[test]
