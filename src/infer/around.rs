@@ -2,6 +2,7 @@
 
 use super::Marks;
 use super::buzz_buffer::{BuzzBuffer, Projector};
+use super::centre::CastCentres;
 use super::project::Landings;
 use crate::frame::{PixelClass, SurfaceSample};
 use rayon::prelude::*;
@@ -146,17 +147,24 @@ impl<'a> Around<'a> {
     }
 
     /// Sets in `ask` the bits of the lights about which the samples around disagree, and clears all others.
-    pub fn disagreement(&self, trust: Trust, ask: &mut [u32]) {
+    pub fn disagreement(&self, rays: &impl CastCentres, trust: Trust, ask: &mut [u32]) {
         if trust == Trust::Proof && !self.is_complete() {
             ask.fill(u32::MAX);
         } else {
-            differing(self.old, self.known(), ask);
+            differing(rays, self.old, self.known(), ask);
         }
     }
 
     /// Takes over into `lit` the bits on which enough samples around that lie on the surface of `sample` agree. Sets in
     /// `ask` those of all other lights.
-    pub fn lend(&self, sample: &SurfaceSample, trust: Trust, lit: &mut [u32], ask: &mut [u32]) {
+    pub fn lend(
+        &self,
+        sample: &SurfaceSample,
+        rays: &impl CastCentres,
+        trust: Trust,
+        lit: &mut [u32],
+        ask: &mut [u32],
+    ) {
         let normal = sample.normal.get();
         let lenders = self.known().filter(|&k| {
             let lender = self.old.sample(k);
@@ -165,7 +173,7 @@ impl<'a> Around<'a> {
         let enough = if trust == Trust::Proof { self.size } else { ENOUGH_TO_LEND };
         match lenders.clone().next() {
             Some(first) if lenders.clone().count() >= enough => {
-                differing(self.old, lenders, ask);
+                differing(rays, self.old, lenders, ask);
                 lit.copy_from_slice(self.old.lit(first));
             }
             _ => ask.fill(u32::MAX),
@@ -173,14 +181,17 @@ impl<'a> Around<'a> {
     }
 }
 
-/// Sets the bits in which the shadow bits of `samples` differ, and clears all others.
-fn differing(old: &BuzzBuffer, mut samples: impl Iterator<Item = usize>, differ: &mut [u32]) {
+/// Sets the bits of lights on which `samples` do not all agree with the first, and clears all others.
+fn differing(
+    rays: &impl CastCentres,
+    old: &BuzzBuffer,
+    mut samples: impl Iterator<Item = usize>,
+    differ: &mut [u32],
+) {
     differ.fill(0);
     let Some(first) = samples.next() else { return };
     for sample in samples {
-        for ((differ, a), b) in differ.iter_mut().zip(old.lit(first)).zip(old.lit(sample)) {
-            *differ |= a ^ b;
-        }
+        rays.differ(old.lit(first), old.lit(sample), differ);
     }
 }
 

@@ -30,6 +30,14 @@ pub trait CastCentres: CastRays {
     /// Finds out which of the lights named by the bits of `ask` reach the sample, and changes their bits in `lit`.
     fn recast(&self, sample: &SurfaceSample, ask: &[u32], lit: &mut [u32], counts: &mut RayCounts);
 
+    /// Sets in `differ` bits of the lights on which two samples disagree: all bits in which they differ, unless some of
+    /// them belong to numbers that are noisy.
+    fn differ(&self, a: &[u32], b: &[u32], differ: &mut [u32]) {
+        for ((differ, a), b) in differ.iter_mut().zip(a).zip(b) {
+            *differ |= a ^ b;
+        }
+    }
+
     /// What the ray through the centre of pixel (x, y) meets first of the triangles that `candidates` lie on. Where these
     /// are the background: that. Not counted, as nothing is looked for in the scene.
     fn nearest_of(
@@ -107,7 +115,7 @@ impl Centring {
                         // A hole may hide a shadow's edge: then look farther.
                         let wide = || Around::new(old, view, sources, (x, y), 2);
                         let around = if around.is_complete() { around } else { wide() };
-                        around.disagreement(trust, ask);
+                        around.disagreement(rays, trust, ask);
                     }
                 }
                 row.class[x] = match (own, centred) {
@@ -150,7 +158,7 @@ impl Centring {
                     let own = sources.of(pixel);
                     if own.is_some_and(|i| is_one_surface(&sample, &old.sample(i), view)) {
                         let around = Around::new(old, view, sources, (x, y), 2);
-                        around.lend(&sample, trust, row.lit_mut(x), ask);
+                        around.lend(&sample, rays, trust, row.lit_mut(x), ask);
                     }
                 }
                 if ask.iter().any(|&bits| bits != 0) {

@@ -42,13 +42,8 @@ impl ShadowEdges {
         self.rows.resize_with(buffer.height(), Vec::new);
         self.rows.par_iter_mut().with_min_len(8).enumerate().for_each(|(y, row)| {
             row.clear();
-            for pixel in y * width..(y + 1) * width {
-                let asked = &asked[pixel * words..][..words];
-                let disagrees = |k| disagree(buffer, view, pixel, k, asked);
-                if differs_around(buffer, pixel, y) && around(buffer, pixel as u32).any(disagrees) {
-                    row.push(pixel as u32);
-                }
-            }
+            let pixels = y * width..(y + 1) * width;
+            row.extend(pixels.filter(|&pixel| differs_around(buffer, pixel, y)).map(|pixel| pixel as u32));
         });
         self.pixels.clear();
         self.rows.iter().for_each(|row| self.pixels.extend(row));
@@ -74,15 +69,15 @@ impl ShadowEdges {
         let ask_one = |((&pixel, ask), lit): ((&u32, &mut [u32]), &mut [u32])| {
             let i = pixel as usize;
             lit.copy_from_slice(buffer.lit(i));
-            for k in around(buffer, pixel) {
-                if disagree(buffer, view, i, k, &asked[i * words..][..words]) {
-                    for (word, ask) in ask.iter_mut().enumerate() {
-                        *ask |= (lit[word] ^ buffer.lit(k)[word]) & !asked[i * words + word];
-                    }
+            let sample = buffer.sample(i);
+            for k in around(buffer, pixel).filter(|&k| buffer.lit(i) != buffer.lit(k)) {
+                if is_one_surface(&sample, &buffer.sample(k), view) {
+                    rays.differ(lit, buffer.lit(k), ask);
                 }
             }
+            ask.iter_mut().zip(&asked[i * words..]).for_each(|(ask, asked)| *ask &= !asked);
             let mut counts = RayCounts::default();
-            rays.recast(&buffer.sample(i), ask, lit, &mut counts);
+            rays.recast(&sample, ask, lit, &mut counts);
             counts
         };
         let all =
@@ -136,11 +131,4 @@ fn around(buffer: &BuzzBuffer, pixel: u32) -> impl Iterator<Item = usize> + use<
     let columns = x.saturating_sub(1)..=(x + 1).min(width - 1);
     let rows = y.saturating_sub(1)..=(y + 1).min(height - 1);
     rows.flat_map(move |y| columns.clone().map(move |x| y * width + x)).filter(move |&k| k != pixel as usize)
-}
-
-/// True where pixels `i` and `k` show one surface and differ in a light that `i` has not asked.
-fn disagree(buffer: &BuzzBuffer, view: &Projector, i: usize, k: usize, asked: &[u32]) -> bool {
-    let mut words = buffer.lit(i).iter().zip(buffer.lit(k)).zip(asked);
-    words.any(|((a, b), asked)| (a ^ b) & !asked != 0)
-        && is_one_surface(&buffer.sample(i), &buffer.sample(k), view)
 }

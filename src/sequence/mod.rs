@@ -286,6 +286,10 @@ impl CastCentres for Caster<'_> {
         self.tracer.recast(sample, ask, lit, counts);
     }
 
+    fn differ(&self, a: &[u32], b: &[u32], differ: &mut [u32]) {
+        self.tracer.differ(a, b, differ);
+    }
+
     fn nearest_of(
         &self,
         x: usize,

@@ -153,6 +153,12 @@ impl<'a> Tracer<'a> {
         }
     }
 
+    /// Sets in `differ` bits of the lights on which the shadow bits of two samples disagree. Shares that came out
+    /// differently by chance agree.
+    pub fn differ(&self, a: &[u32], b: &[u32], differ: &mut [u32]) {
+        self.layout.differ(a, b, differ);
+    }
+
     /// What the ray through raster position (x, y) meets first if it can meet nothing but the triangles of
     /// `candidates`; no ray is cast into the scene, and none is counted. Where the candidates are the background, that.
     pub fn nearest_of(

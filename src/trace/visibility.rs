@@ -14,6 +14,10 @@ pub(super) struct Layout {
     pub ambient: Option<Field>,
     /// Words of a sample.
     pub words: usize,
+    /// The fields that hold shares, and by how much two of them may differ and mean the same.
+    shares: Vec<(Field, f32)>,
+    /// For each word, the bits that are none of a share's.
+    single_bits: Vec<u32>,
 }
 
 /// One light's bits, all in one word.
@@ -39,8 +43,35 @@ impl Layout {
         }
         let has_ambient = options.ambient_samples > 0 && scene.world.color != Vec3::ZERO;
         let ambient = has_ambient.then(|| Field::at(&mut bits, 8));
-        Self { lights, ambient, words: bits.div_ceil(32) }
+        let mut shares: Vec<(Field, f32)> = Vec::new();
+        let soft = lights.iter().filter(|field| field.whole > 1);
+        shares.extend(soft.map(|&field| (field, noise(options.light_samples))));
+        shares.extend(ambient.map(|field| (field, noise(options.ambient_samples))));
+        let words = bits.div_ceil(32);
+        let mut single_bits = vec![u32::MAX; words];
+        for (field, _) in &shares {
+            single_bits[field.word] &= !(field.whole << field.shift);
+        }
+        Self { lights, ambient, words, shares, single_bits }
     }
+
+    /// Sets in `differ` bits of the fields in which `a` and `b` do not mean the same.
+    pub fn differ(&self, a: &[u32], b: &[u32], differ: &mut [u32]) {
+        for (((differ, a), b), single) in differ.iter_mut().zip(a).zip(b).zip(&self.single_bits) {
+            *differ |= (a ^ b) & single;
+        }
+        for (field, noise) in &self.shares {
+            if (field.share(a) - field.share(b)).abs() > *noise {
+                differ[field.word] |= field.whole << field.shift;
+            }
+        }
+    }
+}
+
+/// What two shares from so many rays may differ by though they are of the same truth: some three standard deviations
+/// where an edge crosses the light. None and all of it never are the same.
+fn noise(samples: u32) -> f32 {
+    (2.0 * (samples as f32).powf(-0.75)).min(0.99)
 }
 
 impl Field {
@@ -121,6 +152,28 @@ mod tests {
             assert!((field.share(&words) - share).abs() <= 0.5 / 255.0 + 1e-6);
             assert_eq!(words[0] >> 8, 0xff_ffff, "others keep theirs");
         }
+    }
+
+    #[test]
+    fn shares_differ_by_more_than_their_noise_and_bits_by_anything() {
+        let options = TraceOptions { light_samples: 16, ..TraceOptions::default() };
+        let layout = Layout::new(&scene(&[0.0, 0.1]), options);
+        let sample = |bit: f32, share: f32| {
+            let mut words = [0];
+            layout.lights[0].set(&mut words, bit);
+            layout.lights[1].set(&mut words, share);
+            words
+        };
+        let differ = |a: [u32; 1], b: [u32; 1]| {
+            let mut differ = [0];
+            layout.differ(&a, &b, &mut differ);
+            differ[0]
+        };
+        assert_eq!(differ(sample(0.0, 0.5), sample(0.0, 0.7)), 0);
+        assert_eq!(differ(sample(0.0, 0.5), sample(1.0, 0.7)), 1);
+        assert_eq!(differ(sample(1.0, 0.4), sample(1.0, 0.7)), 0xff00);
+        assert_eq!(differ(sample(0.0, 0.0), sample(1.0, 1.0)), 0xff01);
+        assert!(noise(2) < 1.0);
     }
 
     #[test]
