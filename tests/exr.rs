@@ -53,6 +53,24 @@ fn expected_channels(frame: &Frame) -> Vec<Expected> {
             all.push((name.into(), half, values.iter().map(|v| v[i]).collect()));
         }
     }
+    // What another program makes of the names.
+    let ids = [
+        ("CryptoObject", [0, 0xfd0e_1d43, 0xa515_fc11, 0x7b1a_493f].map(f32::from_bits)),
+        ("CryptoMaterial", [0, 0xaaf3_7ff8, 0x65c6_1f66, 0].map(f32::from_bits)),
+    ];
+    for ((layer, ids), matte) in ids.iter().zip(&frame.mattes) {
+        let covered = |i: &u32| f32::from(*i > 0);
+        let nothing = vec![0.0; matte.index.len()];
+        let values = [
+            matte.index.iter().map(|&i| ids[i as usize]).collect(),
+            matte.index.iter().map(covered).collect(),
+            nothing.clone(),
+            nothing,
+        ];
+        for (color, values) in ["R", "G", "B", "A"].into_iter().zip(values) {
+            all.push((format!("{layer}00.{color}"), false, values));
+        }
+    }
     let two = [(["forward.u", "forward.v"], &frame.forward), (["backward.u", "backward.v"], &frame.backward)];
     for (names, values) in two {
         for (i, name) in names.into_iter().enumerate() {

@@ -113,7 +113,7 @@ pub fn crop(text: &str, full: (u32, u32)) -> Result<Window> {
 
 /// A comma list of layers.
 pub fn aovs(text: &str) -> Result<AovSet> {
-    const NAMES: [(&str, Aov); 10] = [
+    const NAMES: [(&str, Aov); 11] = [
         ("depth", Aov::Depth),
         ("class", Aov::Class),
         ("normal", Aov::Normal),
@@ -124,6 +124,7 @@ pub fn aovs(text: &str) -> Result<AovSet> {
         ("specular", Aov::Specular),
         ("emission", Aov::Emission),
         ("lights", Aov::Lights),
+        ("crypto", Aov::Crypto),
     ];
     let mut set = AovSet::default();
     for name in text.split(',').map(str::trim) {

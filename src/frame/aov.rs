@@ -2,6 +2,7 @@
 
 use super::FrameStats;
 use crate::scene::View;
+use std::sync::Arc;
 
 /// How a frame was made.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -38,6 +39,8 @@ pub enum Aov {
     Emission,
     /// Each light's diffuse part.
     Lights,
+    /// Objects and materials by name.
+    Crypto,
 }
 
 /// Which layers are wanted.
@@ -83,6 +86,17 @@ impl Window {
     }
 }
 
+/// Which of several named things each pixel shows.
+#[derive(Debug, Clone)]
+pub struct Matte {
+    /// Name of the layer.
+    pub layer: &'static str,
+    /// The things' names, the same in all frames.
+    pub names: Arc<[String]>,
+    /// For each pixel a position in `names`, counted from 1; 0 for the background.
+    pub index: Vec<u32>,
+}
+
 /// A finished frame: `window.pixels()` values in each layer, rows from the top; layers not asked for are empty.
 #[derive(Debug, Clone)]
 pub struct Frame {
@@ -120,6 +134,8 @@ pub struct Frame {
     pub emission: Vec<[f32; 3]>,
     /// For each light: its name and its share of `diffuse`.
     pub lights: Vec<(String, Vec<[f32; 3]>)>,
+    /// Objects and materials by name.
+    pub mattes: Vec<Matte>,
     /// Counts and times.
     pub stats: FrameStats,
 }

@@ -6,7 +6,7 @@ mod quality;
 mod sample;
 mod stats;
 
-pub use aov::{Aov, AovSet, Frame, FrameKind, Window};
+pub use aov::{Aov, AovSet, Frame, FrameKind, Matte, Window};
 pub use class::PixelClass;
 pub use quality::Quality;
 pub use sample::{PackedNormal, SurfaceRef, SurfaceSample};

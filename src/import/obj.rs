@@ -57,7 +57,7 @@ pub(super) fn add(file: &Path, scene: &mut Scene) -> Result<()> {
             "materials are grey",
         );
     }
-    let node = scene.nodes.len();
+    let file_node = scene.nodes.len();
     let name = file.file_stem().unwrap_or_default().to_string_lossy().into_owned();
     scene.nodes.push(Node { name, ..Node::default() });
     let first_material = scene.materials.len();
@@ -85,6 +85,9 @@ pub(super) fn add(file: &Path, scene: &mut Scene) -> Result<()> {
         let textured = scene.materials[material].has_textures();
         if let Some(mesh) = mesh(model, material, textured) {
             object += 1;
+            // A node of its own, since objects are named after their nodes.
+            scene.nodes.push(Node { name: mesh.name.clone(), parent: Some(file_node), ..Node::default() });
+            let node = scene.nodes.len() - 1;
             let mesh_index = scene.meshes.len();
             scene.meshes.push(mesh);
             let node_from_object = DAffine3::IDENTITY;

@@ -38,8 +38,8 @@ impl FrameFile {
     }
 }
 
-/// Headers are a few kilobytes.
-const LONGEST_HEADER: u64 = 1 << 20;
+/// Headers are a few kilobytes, but a matte's lists the names of all objects.
+const LONGEST_HEADER: u64 = 16 << 20;
 
 type Verdict = Result<(FrameStats, FrameKind), &'static str>;
 

@@ -18,7 +18,7 @@ use crate::plan::{Plan, Segment};
 use crate::scene::{Pose, Scene, View};
 use crate::trace::{TraceOptions, Tracer};
 use glam::DVec3;
-use resolve::{Neighbour, Resolver, count_hidden, empty_frame};
+use resolve::{MatteNames, Neighbour, Resolver, count_hidden, empty_frame};
 use std::collections::BTreeSet;
 use std::time::Instant;
 
@@ -197,8 +197,9 @@ fn render_segment(
     let accel = &*accel;
     let tracer = Tracer::new(scene, accel, &pose, settings.trace_options());
     buffers.fit(settings.window, tracer.lit_words());
+    let names = settings.aovs.contains(Aov::Crypto).then(|| MatteNames::of(scene));
     let mut emitter =
-        Emitter { scene, settings, accel, tracer: &tracer, origin, cuts, wanted, sink, observer };
+        Emitter { scene, settings, accel, tracer: &tracer, origin, cuts, wanted, names, sink, observer };
     let Buffers { key, old, new, inference } = buffers;
 
     let key_shot = shot(scene, settings, segment.key);
@@ -322,6 +323,7 @@ struct Emitter<'a> {
     origin: DVec3,
     cuts: &'a [i64],
     wanted: &'a BTreeSet<i64>,
+    names: Option<MatteNames>,
     sink: &'a mut dyn FrameSink,
     observer: &'a mut dyn Observer,
 }
@@ -359,6 +361,7 @@ impl Emitter<'_> {
                 shot,
                 next: self.neighbour(shot, number + 1, self.cuts.contains(&(number + 1))),
                 previous: self.neighbour(shot, number - 1, self.cuts.contains(&number)),
+                names: self.names.as_ref(),
             };
             stats.rays += resolver.resolve(buffer, &mut frame);
             stats.seconds.enhance = start.elapsed().as_secs_f64();

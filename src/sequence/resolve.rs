@@ -2,12 +2,13 @@
 
 use super::{Observer, Settings, Shot};
 use crate::accel::Displaced;
-use crate::frame::{Aov, Frame, FrameKind, FrameStats, RayCounts, SurfaceSample, Window};
+use crate::frame::{Aov, Frame, FrameKind, FrameStats, Matte, RayCounts, SurfaceSample, Window};
 use crate::infer::BuzzBuffer;
 use crate::scene::{Scene, View};
 use crate::trace::Tracer;
 use glam::{DVec3, DVec4, Vec3};
 use rayon::prelude::*;
+use std::sync::Arc;
 
 /// Everything that a pixel's final values depend on besides its sample.
 pub(super) struct Resolver<'a> {
@@ -23,6 +24,20 @@ pub(super) struct Resolver<'a> {
     pub next: Option<Neighbour>,
     /// The frame before.
     pub previous: Option<Neighbour>,
+    /// Names for mattes; none where not asked for.
+    pub names: Option<&'a MatteNames>,
+}
+
+/// What mattes are picked by.
+pub(super) struct MatteNames {
+    objects: Arc<[String]>,
+    materials: Arc<[String]>,
+}
+
+impl MatteNames {
+    pub fn of(scene: &Scene) -> Self {
+        Self { objects: scene.object_names().into(), materials: scene.material_names().into() }
+    }
 }
 
 /// The layers of one pixel that come from shading.
@@ -73,7 +88,27 @@ impl Resolver<'_> {
                 })
             });
         }
+        self.fill_mattes(buffer, &mut frame.mattes);
         counts
+    }
+
+    fn fill_mattes(&self, buffer: &BuzzBuffer, mattes: &mut Vec<Matte>) {
+        mattes.clear();
+        let Some(names) = self.names else { return };
+        let pixels = self.settings.window.pixels();
+        let mut add = |layer, names: &Arc<[String]>, number: &(dyn Fn(&SurfaceSample) -> u32 + Sync)| {
+            let mut index = Vec::new();
+            fill(&mut index, pixels, |i| {
+                let sample = buffer.sample(i);
+                if sample.surface.is_background() { 0 } else { number(&sample) }
+            });
+            mattes.push(Matte { layer, names: Arc::clone(names), index });
+        };
+        add("CryptoObject", &names.objects, &|sample| sample.object);
+        add("CryptoMaterial", &names.materials, &|sample| {
+            let mesh = self.scene.instances[sample.surface.instance as usize].mesh;
+            self.scene.meshes[mesh].material as u32 + 1
+        });
     }
 
     fn shade(&self, buffer: &BuzzBuffer, frame: &mut Frame, width: usize) -> RayCounts {
@@ -227,6 +262,7 @@ pub(super) fn empty_frame(view: View) -> Frame {
         specular: Vec::new(),
         emission: Vec::new(),
         lights: Vec::new(),
+        mattes: Vec::new(),
         stats: FrameStats::default(),
     }
 }

@@ -2,7 +2,7 @@
 
 #![allow(dead_code)] // Not every test uses everything.
 
-use buzz::frame::{Frame, FrameKind, FrameStats, PixelClass, RayCounts, StageSeconds, Window};
+use buzz::frame::{Frame, FrameKind, FrameStats, Matte, PixelClass, RayCounts, StageSeconds, Window};
 use buzz::output::{Compression, FileOptions, SettingsHash, SettingsHasher};
 use buzz::scene::{Lens, Projection, Rational, View};
 use glam::{DVec2, DVec3};
@@ -73,6 +73,13 @@ pub fn frame(number: i64, kind: FrameKind, shape: &Shape) -> Frame {
         specular: three(17),
         emission: three(20),
         lights: vec![("Key light".into(), three(23)), ("Key.light".into(), three(26))],
+        mattes: [("CryptoObject", 3), ("CryptoMaterial", 2)]
+            .map(|(layer, count)| Matte {
+                layer,
+                names: (0..count).map(|i| format!("{layer} {i}")).collect(),
+                index: (0..n).map(|i| (i % (count + 1)) as u32).collect(),
+            })
+            .to_vec(),
         stats: FrameStats {
             pixels,
             rays: RayCounts {
@@ -100,6 +107,7 @@ pub fn default_layers(mut frame: Frame) -> Frame {
     frame.specular.clear();
     frame.emission.clear();
     frame.lights.clear();
+    frame.mattes.clear();
     frame
 }
 

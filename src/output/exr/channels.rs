@@ -1,5 +1,6 @@
 //! Which channels a frame becomes: names, types, and where their values come from.
 
+use super::cryptomatte::MatteLayer;
 use crate::frame::Frame;
 use exr::meta::attribute::{ChannelDescription, SampleType, Text};
 use half::slice::HalfFloatSliceExt;
@@ -25,6 +26,12 @@ enum Source<'a> {
     One(&'a [f32]),
     Class(&'a [u8]),
     Tag(&'a [u32]),
+    /// The id of what is numbered.
+    Id(&'a [u32], &'a [f32]),
+    /// 1 where anything is numbered.
+    Covered(&'a [u32]),
+    /// Nothing, for so many pixels.
+    Nothing(usize),
 }
 
 /// Largest finite half.
@@ -33,7 +40,7 @@ const HALF_MAX: f32 = 65504.0;
 impl<'a> Channel<'a> {
     /// The channels of `frame` in the order of the file: sorted by name, as the format requires. Layers that the frame
     /// does not hold have none.
-    pub fn of(frame: &'a Frame) -> Vec<Self> {
+    pub fn of(frame: &'a Frame, mattes: &'a [MatteLayer]) -> Vec<Self> {
         let mut channels = Vec::new();
         let mut add = |name: String, half: bool, source: Source<'a>| {
             channels.push(Channel { name, half, source });
@@ -69,6 +76,13 @@ impl<'a> Channel<'a> {
                 add(format!("{layer}.{color}"), true, Source::Three(values, i));
             }
         }
+        for MatteLayer { matte, ids } in mattes {
+            let (index, nothing) = (&matte.index, Source::Nothing(matte.index.len()));
+            let ranks = [Source::Id(index, ids), Source::Covered(index), nothing, nothing];
+            for (color, source) in ["R", "G", "B", "A"].into_iter().zip(ranks) {
+                add(format!("{}00.{color}", matte.layer), false, source);
+            }
+        }
         channels.sort_by(|a, b| a.name.as_bytes().cmp(b.name.as_bytes()));
         channels
     }
@@ -92,7 +106,8 @@ impl<'a> Channel<'a> {
             Source::Two(values, _) => values.len(),
             Source::One(values) => values.len(),
             Source::Class(values) => values.len(),
-            Source::Tag(values) => values.len(),
+            Source::Tag(values) | Source::Id(values, _) | Source::Covered(values) => values.len(),
+            Source::Nothing(pixels) => pixels,
         }
     }
 
@@ -109,6 +124,12 @@ impl<'a> Channel<'a> {
             Source::One(values) => floats.extend_from_slice(&values[pixels]),
             Source::Class(values) => floats.extend(values[pixels].iter().map(|&v| f32::from(v))),
             Source::Tag(values) => floats.extend(values[pixels].iter().map(|&v| v as f32)),
+            Source::Id(values, ids) => {
+                let id = |&v: &u32| (v as usize).checked_sub(1).and_then(|i| ids.get(i)).copied();
+                floats.extend(values[pixels].iter().map(|v| id(v).unwrap_or(0.0)));
+            }
+            Source::Covered(values) => floats.extend(values[pixels].iter().map(|&v| f32::from(v > 0))),
+            Source::Nothing(_) => floats.resize(pixels.len(), 0.0),
         }
         let largest = if self.half { HALF_MAX } else { f32::MAX };
         // False for NaN.

@@ -4,6 +4,7 @@
 //! in a hash map, so that their order would differ from run to run, and frames would not be byte-identical.)
 
 use super::channels::Channel;
+use super::cryptomatte::MatteLayer;
 use super::{FileOptions, counts};
 use crate::frame::{Frame, FrameKind, PixelClass};
 use crate::scene::{Projection, Rational, View};
@@ -38,10 +39,14 @@ pub(super) fn bytes(
     frame: &Frame,
     options: &FileOptions,
     channels: &[Channel],
+    mattes: &[MatteLayer],
 ) -> exr::error::Result<Vec<u8>> {
     let mut bytes = MAGIC.to_vec();
     for (name, value) in attributes(frame, options, channels) {
         attribute::write(name.as_bytes(), &value, &mut bytes)?;
+    }
+    for (name, value) in mattes.iter().flat_map(MatteLayer::attributes) {
+        attribute::write(name.as_bytes(), &text(&value), &mut bytes)?;
     }
     bytes.push(0);
     Ok(bytes)

@@ -6,6 +6,7 @@
 mod channels;
 mod chunk;
 mod counts;
+mod cryptomatte;
 mod header;
 
 pub use chunk::Compression;
@@ -18,6 +19,7 @@ use crate::scene::Rational;
 use crate::{Error, Result};
 use channels::{Channel, Row};
 use chunk::Scratch;
+use cryptomatte::MatteLayer;
 use exr::meta::BlockDescription;
 use exr::meta::attribute::{IntegerBounds, LineOrder, Text};
 use exr::meta::header::Header;
@@ -59,7 +61,8 @@ pub fn encode(frame: &Frame, options: &FileOptions) -> Result<EncodedFrame> {
     {
         return Err(fail(format!("{window:?} is not inside the image")));
     }
-    let channels = Channel::of(frame);
+    let mattes = MatteLayer::of(frame);
+    let channels = Channel::of(frame, &mattes);
     if let Some(channel) = channels.iter().find(|c| c.len() != window.pixels()) {
         let (have, want) = (channel.len(), window.pixels());
         return Err(fail(format!("channel {} has {have} values for {want} pixels", channel.name)));
@@ -92,7 +95,8 @@ pub fn encode(frame: &Frame, options: &FileOptions) -> Result<EncodedFrame> {
     let blocks: Result<Vec<_>> = firsts.into_par_iter().map_init(Default::default, block).collect();
     let (blocks, repaired): (Vec<_>, Vec<_>) = blocks?.into_iter().unzip();
 
-    let mut head = header::bytes(frame, options, &channels).map_err(|e| fail(format!("header: {e}")))?;
+    let mut head =
+        header::bytes(frame, options, &channels, &mattes).map_err(|e| fail(format!("header: {e}")))?;
     let mut offset = (head.len() + 8 * blocks.len()) as u64;
     for block in &blocks {
         head.extend(offset.to_le_bytes());
