@@ -38,7 +38,7 @@ fn a_sequence_is_compared_frame_by_frame() {
     fs::write(a.join(".walk.0008.exr.12.tmp"), "").unwrap();
     fs::write(a.join("report.json"), "").unwrap();
 
-    let result = compare(&a, &b).unwrap();
+    let result = compare(&a, &b, None).unwrap();
     assert_eq!(result.frames.iter().map(|f| f.frame).collect::<Vec<_>>(), [1, 2, 3, 4]);
     assert_eq!(result.unmatched.sequence, ["walk.0009.exr"]);
     assert_eq!(result.unmatched.reference, ["other_000.exr"]);
@@ -81,7 +81,7 @@ fn several_sequences_in_a_folder_are_kept_apart() {
             write(&b, &name, &plain(number, FrameKind::Traced));
         }
     }
-    let result = compare(&a, &b).unwrap();
+    let result = compare(&a, &b, None).unwrap();
     assert_eq!(result.frames.iter().map(|f| f.frame).collect::<Vec<_>>(), [-1, 1, -1, 1]);
     assert_eq!((result.worst.error.psnr_db, result.mean.psnr_db), (None, None));
 }
@@ -90,14 +90,14 @@ fn several_sequences_in_a_folder_are_kept_apart() {
 fn what_cannot_be_compared_is_an_error_that_names_it() {
     let folder = tempfile::tempdir().unwrap();
     let (a, b) = (folder.path().join("a"), folder.path().join("b"));
-    assert_eq!(compare(&a, &b).unwrap_err().exit_code(), 3);
+    assert_eq!(compare(&a, &b, None).unwrap_err().exit_code(), 3);
     write(&a, "walk.0001.exr", &plain(1, FrameKind::Traced));
     write(&b, "walk.0002.exr", &plain(1, FrameKind::Traced));
-    assert!(compare(&a, &b).unwrap_err().to_string().contains("frame number"));
+    assert!(compare(&a, &b, None).unwrap_err().to_string().contains("frame number"));
     write(&b, "walk.0001.exr", &default_layers(frame(1, FrameKind::Traced, &Shape::whole(12, 16))));
-    assert!(compare(&a, &b).unwrap_err().to_string().contains("24x16"));
+    assert!(compare(&a, &b, None).unwrap_err().to_string().contains("24x16"));
     fs::write(b.join("walk.0001.exr"), "not an image").unwrap();
-    let error = compare(&a, &b).unwrap_err();
+    let error = compare(&a, &b, None).unwrap_err();
     assert!(error.to_string().contains("walk.0001.exr"), "{error}");
 }
 

@@ -29,6 +29,8 @@ pub enum Command {
     Inspect(InspectArgs),
     /// Measure the error of a sequence against a reference, frame by frame.
     Compare(CompareArgs),
+    /// Measure what each quality costs and gets wrong, all on the same frames.
+    Trade(TradeArgs),
 }
 
 /// Optional for the parser's sake only: a subcommand takes their place.
@@ -84,6 +86,27 @@ pub struct CompareArgs {
     /// Exit with 1 if any frame's PSNR is under this.
     #[arg(long, value_name = "DB", allow_negative_numbers = true)]
     pub fail_below: Option<f64>,
+    /// Write a PNG a frame there: the frame, its reference, and their difference times 4.
+    #[arg(long, value_name = "FOLDER")]
+    pub differences: Option<PathBuf>,
+}
+
+#[derive(Debug, Args)]
+pub struct TradeArgs {
+    /// The scene: .gltf, .glb, or .obj (with --camera-from or --turntable).
+    pub input: PathBuf,
+    /// Folder for trade.json, trade.csv and trade.html.
+    pub out_dir: PathBuf,
+    #[command(flatten)]
+    pub scene: SceneArgs,
+    #[command(flatten)]
+    pub render: RenderArgs,
+    /// Measure the segments that hold these frames, whole [default: segments from all over, some 48 frames].
+    #[arg(short, long, allow_hyphen_values = true)]
+    pub frames: Option<String>,
+    /// How to show progress.
+    #[arg(long, value_enum, default_value = "auto")]
+    pub progress: ProgressArg,
 }
 
 /// What to read, and how.
@@ -118,6 +141,13 @@ pub struct ImageArgs {
     /// Accuracy of the frames that are not key frames.
     #[arg(short, long, value_enum, default_value = "centred")]
     pub quality: QualityArg,
+    #[command(flatten)]
+    pub render: RenderArgs,
+}
+
+/// What every quality has in common.
+#[derive(Debug, Args)]
+pub struct RenderArgs {
     /// Image size: 1920x1080, or a share of the scene's own: 50% [default: the scene's, else 1280x720].
     #[arg(short, long)]
     pub resolution: Option<String>,
@@ -155,8 +185,8 @@ pub struct OutputArgs {
     /// Cast a ray to every reused sample and report how many are hidden (slow).
     #[arg(long)]
     pub audit: bool,
-    /// Layers beside the beauty: depth class normal position motion object diffuse specular emission lights, by
-    /// commas; or all, or beauty (depth,class).
+    /// Layers beside the beauty: depth class normal position motion object diffuse specular emission lights crypto,
+    /// by commas; or all, or beauty (depth,class).
     #[arg(long, default_value = "depth,class")]
     pub aov: String,
     /// Compression of the EXR files.

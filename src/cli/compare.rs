@@ -11,7 +11,7 @@ pub fn run(args: CompareArgs) -> Result<ExitCode> {
     if args.fail_below.is_some_and(f64::is_nan) {
         return Err(Error::Usage("--fail-below NaN: expected decibels".into()).into());
     }
-    let comparison = compare(&args.dir, &args.reference)?;
+    let comparison = compare(&args.dir, &args.reference, args.differences.as_deref())?;
     say::result(&match args.format {
         Format::Json => serde_json::to_string_pretty(&comparison)? + "\n",
         Format::Text => comparison.to_string(),

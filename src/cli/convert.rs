@@ -8,11 +8,12 @@ use super::progress::{Progress, Tally};
 use super::say;
 use anyhow::{Context, Result};
 use buzz::error::Error;
-use buzz::frame::{FrameKind, FrameStats};
+use buzz::frame::{Aov, FrameKind, FrameStats};
 use buzz::infer::BuzzBuffer;
 use buzz::output::{
     self, Compression, ExrSink, FileOptions, FrameFile, FrameRecord, KeyFrame, NamePattern, OutputFolder,
-    Report, ReportInput, RunSeconds, SceneSummary, SegmentRange, SettingsHash, SettingsHasher, peak_bytes,
+    Report, ReportInput, Review, RunSeconds, SceneSummary, SegmentRange, SettingsHash, SettingsHasher,
+    Thumbnails, WithThumbnails, peak_bytes,
 };
 use buzz::plan::Plan;
 use buzz::scene::Requirements;
@@ -32,7 +33,7 @@ pub fn run(args: ConvertArgs) -> Result<ExitCode> {
     let names =
         NamePattern::parse(args.output.name.as_deref().unwrap_or(NamePattern::DEFAULT), &stem(input))?;
     let asked = args.output.frames.as_deref().map(parse::frames).transpose()?;
-    let mut job = Job::new(input, &args.scene, &args.image)?;
+    let mut job = Job::new(input, &args.scene, &args.image.render, args.image.quality)?;
     warn_of_ignored(&job.scene);
     choose_image(&mut job, &args)?;
     let timing = job.scene.timing;
@@ -67,9 +68,14 @@ pub fn run(args: ConvertArgs) -> Result<ExitCode> {
     let mut sink = ExrSink::new(folder, options)?;
     let pixels = job.settings.window.pixels() as u64;
     let progress = Progress::new(args.output.progress, to_render.len(), pixels, interrupt);
+    let mut thumbnails = Thumbnails::of(&frames);
+    for record in &skipped {
+        thumbnails.read(record.number, &sink.folder().file_of(record.number));
+    }
     let mut recorder = Recorder { progress, records: skipped };
     let Job { scene, accel, settings, .. } = &mut job;
-    let rendered = render_sequence(scene, accel, settings, &plan, &to_render, &mut sink, &mut recorder);
+    let mut shown = WithThumbnails { sink: &mut sink, thumbnails: &mut thumbnails };
+    let rendered = render_sequence(scene, accel, settings, &plan, &to_render, &mut shown, &mut recorder);
     // Frames that are under way are still written, whatever stopped the run.
     let written = sink.finish();
     recorder.progress.finish();
@@ -97,13 +103,25 @@ pub fn run(args: ConvertArgs) -> Result<ExitCode> {
     let whole = frames == (timing.first..=timing.last).collect();
     let path = args.output.report.clone().unwrap_or_else(|| out_dir.join(report_name(&frames, whole)));
     report.write_json(&path)?;
-    report.write_html(&path.with_extension("html"))?;
+    report.write_html(&path.with_extension("html"), &thumbnails.encoded())?;
+    let review = Review {
+        folder: out_dir,
+        names: sink.folder().names(),
+        frames: &frames,
+        cuts: &plan.cuts,
+        keyframes: &report.plan.keyframes,
+        fps: timing.fps,
+        width: job.settings.width,
+        height: job.settings.height,
+        has_class: job.settings.aovs.contains(Aov::Class),
+    };
+    review.write(&path, &thumbnails)?;
     say::result(&summary(&report))?;
     Ok(ExitCode::SUCCESS)
 }
 
 /// Finds out before the rendering, not after it, that the report cannot be written.
-fn prepare_report(path: &Path) -> Result<()> {
+pub(super) fn prepare_report(path: &Path) -> Result<()> {
     if path.extension().is_none_or(|e| e != "json") {
         let message =
             format!("--report {}: expected a .json file; a page is written beside it", path.display());

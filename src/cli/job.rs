@@ -1,6 +1,6 @@
 //! Arguments as meant: the scene read, the camera chosen, sizes and ranges resolved.
 
-use super::args::{ImageArgs, QualityArg, SceneArgs};
+use super::args::{QualityArg, RenderArgs, SceneArgs};
 use super::{parse, say};
 use anyhow::{Context, Result};
 use buzz::accel::Accel;
@@ -27,9 +27,14 @@ pub struct Job {
 
 impl Job {
     /// Reads the scene and resolves the options.
-    pub fn new(input: &Path, scene_args: &SceneArgs, image: &ImageArgs) -> Result<Self> {
-        let threads = use_threads(image.threads)?;
-        let longest_segment = parse::segment(&image.segment)?;
+    pub fn new(
+        input: &Path,
+        scene_args: &SceneArgs,
+        render: &RenderArgs,
+        quality: QualityArg,
+    ) -> Result<Self> {
+        let threads = use_threads(render.threads)?;
+        let longest_segment = parse::segment(&render.segment)?;
         let start = Instant::now();
         let mut scene = read(input, scene_args)?;
         let import_seconds = start.elapsed().as_secs_f64();
@@ -40,19 +45,26 @@ impl Job {
         refuse_endless(&scene, input)?;
         let own = scene.timing.resolution.unwrap_or((1280, 720));
         let (width, height) =
-            image.resolution.as_deref().map_or(Ok(own), |text| parse::resolution(text, own))?;
+            render.resolution.as_deref().map_or(Ok(own), |text| parse::resolution(text, own))?;
         let mut settings = Settings::new(width, height);
         settings.camera = scene_args.camera.as_deref().map(|name| find_camera(&scene, name)).transpose()?;
         let start = Instant::now();
         let accel = Accel::new(&scene);
         let accel_seconds = start.elapsed().as_secs_f64();
-        settings.quality = match image.quality {
+        let mut job =
+            Self { scene, accel, longest_segment, settings, threads, import_seconds, accel_seconds };
+        job.choose_quality(quality);
+        Ok(job)
+    }
+
+    /// Renders with `quality` from now on.
+    pub fn choose_quality(&mut self, quality: QualityArg) {
+        self.settings.quality = match quality {
             QualityArg::Full => Quality::Full,
             QualityArg::HalfPixel => Quality::HalfPixel,
             QualityArg::Centred => Quality::Centred,
             QualityArg::Verified => Quality::Verified,
         };
-        Ok(Self { scene, accel, longest_segment, settings, threads, import_seconds, accel_seconds })
     }
 
     /// Plans the scene's own range.

@@ -10,6 +10,7 @@ mod parse;
 mod plan;
 mod progress;
 mod say;
+mod trade;
 
 use anyhow::Result;
 use args::{Cli, Command};
@@ -45,6 +46,7 @@ fn dispatch(cli: Cli) -> Result<ExitCode> {
         Some(Command::Plan(args)) => plan::run(args),
         Some(Command::Inspect(args)) => inspect::run(args),
         Some(Command::Compare(args)) => compare::run(args),
+        Some(Command::Trade(args)) => trade::run(args),
         None => convert::run(cli.convert),
     }
 }

@@ -12,7 +12,7 @@ use serde_json::{Value, json};
 use std::process::ExitCode;
 
 pub fn run(args: PlanArgs) -> Result<ExitCode> {
-    let mut job = Job::new(&args.input, &args.scene, &args.image)?;
+    let mut job = Job::new(&args.input, &args.scene, &args.image.render, args.image.quality)?;
     warn_of_ignored(&job.scene);
     let plan = job.plan(&Unwatched)?;
     say::result(&match args.format {

@@ -1,6 +1,8 @@
 //! One sequence against another, frame by frame.
 
-use super::{Exposure, ImageError, Percentile, ReadFrame, image_error, read_frame};
+use super::{
+    Exposure, ImageError, Percentile, Place, ReadFrame, compare_pictures, picture, read_frame, worst_place,
+};
 use crate::frame::FrameKind;
 use crate::output::number_in_name;
 use crate::{Error, Result};
@@ -44,6 +46,8 @@ pub struct FrameError {
     /// The error.
     #[serde(flatten)]
     pub error: ImageError,
+    /// Where it is worst; none in identical frames.
+    pub worst_place: Option<Place>,
 }
 
 /// Means over frames that are not identical to their reference.
@@ -61,12 +65,17 @@ pub struct MeanError {
     pub over_5_percent: f64,
 }
 
+/// Factor on differences in pictures of them, so that small ones can be seen.
+pub const ENHANCED: f32 = 4.0;
+
 /// Compares the EXR files of folder `sequence` with those of folder `reference`, paired by the frame numbers in their names
-/// (and, if a folder holds several sequences, by the rest of the names).
+/// (and, if a folder holds several sequences, by the rest of the names). If a folder for `pictures` is given, a PNG a frame is
+/// written there: the frame, its reference, and the absolute difference times [`ENHANCED`], side by side.
 ///
 /// # Errors
-/// [`Error::Input`] if a folder or file cannot be read, if no frame has a counterpart, or if a pair differs in size.
-pub fn compare(sequence: &Path, reference: &Path) -> Result<Comparison> {
+/// [`Error::Input`] if a folder or file cannot be read, if no frame has a counterpart, or if a pair differs in size;
+/// [`Error::Output`] if a picture cannot be written.
+pub fn compare(sequence: &Path, reference: &Path, pictures: Option<&Path>) -> Result<Comparison> {
     let (pairs, unmatched) = pair_up(list(sequence)?, list(reference)?);
     if pairs.is_empty() {
         let message = format!("no EXR file in it has the frame number of one in {}", reference.display());
@@ -84,7 +93,10 @@ pub fn compare(sequence: &Path, reference: &Path) -> Result<Comparison> {
             Ok(a)
         })?;
     let exposure = Exposure::from_p99(percentile.get(0.99));
-    let errors: Result<Vec<_>> = pairs.par_iter().map(|pair| pair.compare(exposure)).collect();
+    if let Some(folder) = pictures {
+        std::fs::create_dir_all(folder).map_err(|e| Error::output(folder, e.to_string()))?;
+    }
+    let errors: Result<Vec<_>> = pairs.par_iter().map(|pair| pair.compare(exposure, pictures)).collect();
     let (frames, inferred): (Vec<_>, Vec<_>) = errors?.into_iter().unzip();
 
     let decibels = |f: &FrameError| f.error.psnr_db.unwrap_or(f64::INFINITY);
@@ -94,8 +106,8 @@ pub fn compare(sequence: &Path, reference: &Path) -> Result<Comparison> {
     let of_inferred = frames.iter().zip(&inferred).filter(|(_, inferred)| **inferred).map(|(frame, _)| frame);
     Ok(Comparison {
         worst,
-        mean: MeanError::of(frames.iter()),
-        inferred_mean: MeanError::of(of_inferred),
+        mean: MeanError::of(frames.iter().map(|f| f.error)),
+        inferred_mean: MeanError::of(of_inferred.map(|f| f.error)),
         exposure: exposure.scale,
         unmatched,
         frames,
@@ -112,7 +124,7 @@ struct Pair {
 
 impl Pair {
     /// The error, and whether the frame was inferred.
-    fn compare(&self, exposure: Exposure) -> Result<(FrameError, bool)> {
+    fn compare(&self, exposure: Exposure, pictures: Option<&Path>) -> Result<(FrameError, bool)> {
         let a: ReadFrame = read_frame(&self.sequence)?;
         let b = read_frame(&self.reference)?;
         if (a.width, a.height) != (b.width, b.height) {
@@ -120,15 +132,32 @@ impl Pair {
             let message = format!("it is {}, but {} is {}", size(&a), self.reference.display(), size(&b));
             return Err(Error::input(&self.sequence, "dataWindow", message));
         }
-        let error = image_error(&a.color, &b.color, a.width, exposure);
-        Ok((FrameError { frame: self.frame, error }, matches!(a.kind, Some(FrameKind::Inferred { .. }))))
+        let (error, map) = compare_pictures(&a.color, &b.color, a.width, exposure);
+        if let Some(folder) = pictures {
+            self.draw(&a, &b, exposure, folder)?;
+        }
+        let error = FrameError { frame: self.frame, error, worst_place: worst_place(&map, a.width) };
+        Ok((error, matches!(a.kind, Some(FrameKind::Inferred { .. }))))
+    }
+
+    /// Writes the frame, its reference and their difference as a picture of the frame's name.
+    fn draw(&self, a: &ReadFrame, b: &ReadFrame, exposure: Exposure, folder: &Path) -> Result<()> {
+        let width = a.width as u32;
+        let parts = [
+            picture::beauty(&a.color, width, exposure),
+            picture::beauty(&b.color, width, exposure),
+            picture::difference(&a.color, &b.color, width, exposure, ENHANCED),
+        ];
+        let parts: Vec<_> = parts.into_iter().flatten().collect();
+        let name = Path::new(self.sequence.file_name().unwrap_or_default()).with_extension("png");
+        picture::write_png(&picture::contact_sheet(&parts, 3, width), &folder.join(name))
     }
 }
 
 impl MeanError {
-    fn of<'a>(frames: impl Iterator<Item = &'a FrameError>) -> Self {
+    pub(super) fn of(errors: impl Iterator<Item = ImageError>) -> Self {
         let mut sum = Self::default();
-        for error in frames.map(|f| f.error) {
+        for error in errors {
             if let Some(db) = error.psnr_db {
                 sum.frames += 1;
                 *sum.psnr_db.get_or_insert(0.0) += db;
@@ -196,20 +225,27 @@ fn pair_up(mut sequence: Sequences, mut reference: Sequences) -> (Vec<Pair>, Unm
 /// The table of `--format text`.
 impl fmt::Display for Comparison {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        writeln!(f, "{:>15}  {:>8}  {:>8}  {:>8}  {:>8}", "frame", "PSNR dB", "FLIP", "max", "over 5 %")?;
-        let row = |f: &mut fmt::Formatter<'_>, name: String, e: ImageError| {
+        let titles = ["PSNR dB", "FLIP", "max", "over 5 %"].map(|title| format!("  {title:>8}")).concat();
+        writeln!(f, "{:>15}{titles}  worst at", "frame")?;
+        let row = |f: &mut fmt::Formatter<'_>, name: String, e: ImageError, place: Option<Place>| {
             let db = e.psnr_db.map_or("same".to_string(), |db| format!("{db:.2}"));
             let share = 100.0 * e.over_5_percent;
-            writeln!(f, "{name:>15}  {db:>8}  {:>8.4}  {:>8.4}  {share:>6.2} %", e.flip_mean, e.max_abs)
+            let place = place.map(|p| format!("  {},{} (FLIP {:.3} on {3}x{3})", p.x, p.y, p.flip, p.side));
+            let place = place.unwrap_or_default();
+            writeln!(
+                f,
+                "{name:>15}  {db:>8}  {:>8.4}  {:>8.4}  {share:>6.2} %{place}",
+                e.flip_mean, e.max_abs
+            )
         };
-        for FrameError { frame, error } in &self.frames {
-            row(f, frame.to_string(), *error)?;
+        for FrameError { frame, error, worst_place } in &self.frames {
+            row(f, frame.to_string(), *error, *worst_place)?;
         }
-        row(f, format!("worst ({})", self.worst.frame), self.worst.error)?;
+        row(f, format!("worst ({})", self.worst.frame), self.worst.error, self.worst.worst_place)?;
         for (name, mean) in [("mean", self.mean), ("inferred mean", self.inferred_mean)] {
             if mean.frames > 0 {
                 let MeanError { psnr_db, flip_mean, max_abs, over_5_percent, .. } = mean;
-                row(f, name.to_string(), ImageError { psnr_db, flip_mean, max_abs, over_5_percent })?;
+                row(f, name.to_string(), ImageError { psnr_db, flip_mean, max_abs, over_5_percent }, None)?;
             }
         }
         for (side, names) in

@@ -1,10 +1,10 @@
 //! Numbers for the difference of two pictures.
 
-use super::{Exposure, flip_mean};
+use super::{Exposure, PIXELS_PER_DEGREE, flip_map};
 use serde::{Deserialize, Serialize};
 
 /// The difference of two pictures, both encoded by the same [`Exposure`].
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct ImageError {
     /// Peak signal-to-noise ratio, decibels; `None` (infinite) for identical pictures.
     pub psnr_db: Option<f64>,
@@ -45,6 +45,16 @@ pub fn image_error(
     width: usize,
     exposure: Exposure,
 ) -> ImageError {
+    compare_pictures(picture, reference, width, exposure).0
+}
+
+/// [`image_error`], and the FLIP map that it is the mean of; no map for identical pictures.
+pub fn compare_pictures(
+    picture: &[[f32; 4]],
+    reference: &[[f32; 4]],
+    width: usize,
+    exposure: Exposure,
+) -> (ImageError, Vec<f32>) {
     let (a, b) = (exposure.encode_all(picture), exposure.encode_all(reference));
     let (mut sum, mut largest, mut over) = (0.0, 0.0f32, 0u64);
     for (&a, &b) in a.iter().zip(&b) {
@@ -54,12 +64,14 @@ pub fn image_error(
         over += u64::from(worst > 0.05);
     }
     let pixels = a.len().max(1) as f64;
-    ImageError {
+    let map = if sum == 0.0 { Vec::new() } else { flip_map(&a, &b, width, PIXELS_PER_DEGREE) };
+    let error = ImageError {
         psnr_db: decibels(sum, 3 * a.len() as u64),
-        flip_mean: if sum == 0.0 { 0.0 } else { flip_mean(&a, &b, width) },
+        flip_mean: map.iter().map(|&v| f64::from(v)).sum::<f64>() / pixels,
         max_abs: largest.into(),
         over_5_percent: over as f64 / pixels,
-    }
+    };
+    (error, map)
 }
 
 fn squared(a: [f32; 3], b: [f32; 3]) -> f64 {

@@ -8,10 +8,13 @@ mod error;
 mod exposure;
 mod flip;
 pub mod picture;
+mod place;
 mod read;
+pub mod trade;
 
-pub use compare::{Comparison, FrameError, MeanError, Unmatched, compare};
-pub use error::{ImageError, image_error, psnr, psnr_where};
+pub use compare::{Comparison, ENHANCED, FrameError, MeanError, Unmatched, compare};
+pub use error::{ImageError, compare_pictures, image_error, psnr, psnr_where};
 pub use exposure::{Exposure, Percentile};
 pub use flip::{PIXELS_PER_DEGREE, flip_map, flip_mean};
+pub use place::{Place, worst_place};
 pub use read::{ReadFrame, read_frame};

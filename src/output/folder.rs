@@ -37,6 +37,11 @@ impl OutputFolder {
         self.path.join(self.names.file_name(frame))
     }
 
+    /// What the frames are called.
+    pub fn names(&self) -> &NamePattern {
+        &self.names
+    }
+
     /// What stands there now.
     pub fn check(&self, frame: i64, settings_hash: &SettingsHash) -> FrameFile {
         FrameFile::check(&self.file_of(frame), settings_hash)

@@ -13,7 +13,9 @@ mod page;
 mod peak;
 mod report;
 mod resume;
+mod review;
 mod sink;
+mod thumbnails;
 mod write;
 
 pub use exr::{Compression, FileOptions};
@@ -28,5 +30,8 @@ pub use report::{
     SegmentRange, Settings, TotalSeconds, Totals,
 };
 pub use resume::FrameFile;
+pub use review::Review;
 pub use sink::ExrSink;
+pub use thumbnails::{Thumbnail, Thumbnails, WithThumbnails};
+pub use write::write_alone;
 pub(crate) use write::write_whole;

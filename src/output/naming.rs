@@ -73,6 +73,11 @@ impl NamePattern {
         Ok(name)
     }
 
+    /// What stands before the frame number, what stands after it, and the least number of its characters.
+    pub fn parts(&self) -> (&str, &str, usize) {
+        (&self.prefix, &self.suffix, self.width)
+    }
+
     /// The name of `frame`'s file. Negative numbers are written as C's `%04d` does: `-001`.
     pub fn file_name(&self, frame: i64) -> String {
         format!("{}{frame:0width$}{}", self.prefix, self.suffix, width = self.width)

@@ -19,8 +19,12 @@ pub(crate) fn write_whole<'a>(path: &Path, parts: impl IntoIterator<Item = &'a [
     })
 }
 
-/// [`write_whole`] of a file that no other run writes: makes its folder if need be, and removes what a killed run left.
-pub(super) fn write_alone(path: &Path, bytes: &[u8]) -> Result<()> {
+/// Writes a file that no other run writes, whole or not at all: makes its folder if need be, and removes what a killed run
+/// left.
+///
+/// # Errors
+/// [`Error::Output`].
+pub fn write_alone(path: &Path, bytes: &[u8]) -> Result<()> {
     let folder = match path.parent() {
         Some(folder) if !folder.as_os_str().is_empty() => folder,
         _ => Path::new("."),

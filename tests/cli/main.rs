@@ -3,6 +3,7 @@
 #![allow(missing_docs, clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 mod determinism;
+mod layers;
 mod motion;
 mod options;
 mod pipes;
@@ -12,4 +13,5 @@ mod rig;
 mod soft;
 mod stage;
 mod stopping;
+mod trade;
 mod whole;

@@ -1,0 +1,79 @@
+//! `buzz-convert trade`: what each quality costs and what it gets wrong.
+
+use super::args::{ProgressArg, QualityArg, TradeArgs};
+use super::convert::prepare_report;
+use super::interrupt::Interrupt;
+use super::job::{Job, warn_of_ignored};
+use super::{parse, say};
+use anyhow::{Context, Result};
+use buzz::error::Error;
+use buzz::measure::trade::{Candidate, Trade, Watch, sample, trade};
+use buzz::output::write_alone;
+use buzz::sequence::Quality;
+use clap::ValueEnum;
+use std::path::Path;
+use std::process::ExitCode;
+use std::sync::Arc;
+
+pub fn run(args: TradeArgs) -> Result<ExitCode> {
+    let interrupt = Interrupt::watch().context("signals cannot be watched")?;
+    let wanted = args.frames.as_deref().map(parse::frames).transpose()?;
+    let mut job = Job::new(&args.input, &args.scene, &args.render, QualityArg::Full)?;
+    warn_of_ignored(&job.scene);
+    prepare_report(&args.out_dir.join("trade.json"))?;
+    let mut candidates = Vec::new();
+    for &quality in QualityArg::value_variants() {
+        job.choose_quality(quality);
+        let plan = job.plan(&*interrupt)?;
+        candidates.push(Candidate { settings: job.settings.clone(), plan });
+    }
+    // The truth comes first.
+    candidates.sort_by_key(|c| c.settings.quality != Quality::Full);
+    let usual = candidates.iter().find(|c| c.settings.quality == Quality::default());
+    let spans = usual.map(|c| sample(&c.plan, wanted.as_ref())).unwrap_or_default();
+    if spans.is_empty() {
+        let (first, last) = (job.scene.timing.first, job.scene.timing.last);
+        let frames = args.frames.unwrap_or_default();
+        return Err(Error::Usage(format!("--frames {frames}: the scene has frames {first}-{last}")).into());
+    }
+    let mut watch = Shown { style: args.progress, interrupt };
+    let input = args.input.display().to_string();
+    let Job { scene, accel, .. } = &mut job;
+    let result = trade(&input, scene, accel, &candidates, &spans, &mut watch)?;
+    write(&result, &args.out_dir)?;
+    say::result(&result.to_string())?;
+    Ok(ExitCode::SUCCESS)
+}
+
+fn write(trade: &Trade, folder: &Path) -> Result<()> {
+    let json = serde_json::to_string_pretty(trade)? + "\n";
+    for (name, text) in [("trade.json", json), ("trade.csv", trade.csv()), ("trade.html", trade.html())] {
+        write_alone(&folder.join(name), text.as_bytes())?;
+    }
+    Ok(())
+}
+
+/// Says how far it is.
+struct Shown {
+    style: ProgressArg,
+    interrupt: Arc<Interrupt>,
+}
+
+impl Watch for Shown {
+    fn rendered(&mut self, quality: Quality, done: usize, total: usize) {
+        let percent = 100 * done / total.max(1);
+        match self.style {
+            ProgressArg::None => {}
+            ProgressArg::Openjd => {
+                // A reader that cannot be reached is no error of the measurement.
+                let _ = say::result(&format!("openjd_progress: {percent}\n"));
+            }
+            _ => say::line(format_args!("{done}/{total} segments measured ({})", quality.name())),
+        }
+    }
+
+    fn stop_requested(&self) -> Option<i32> {
+        use buzz::sequence::Observer;
+        self.interrupt.stop_requested()
+    }
+}

@@ -1,0 +1,25 @@
+//! A Blender script: the sequence in the compositor, and over it the class of each pixel in colour.
+
+use super::Review;
+use crate::measure::picture::CLASS_COLORS;
+use serde_json::json;
+
+const SCRIPT: &str = include_str!("blender.py");
+
+impl Review<'_> {
+    /// The script, with the frames in folder `base`.
+    pub(super) fn blender_script(&self, base: &str, first: i64, last: i64) -> String {
+        let sequence = json!({
+            "folder": base,
+            "first_file": self.names.file_name(first),
+            "first": first,
+            "last": last,
+            "size": [self.width, self.height],
+            "fps": [self.fps.numerator, self.fps.denominator],
+            "title": self.title(),
+            "class_colors": CLASS_COLORS,
+        });
+        // JSON without true, false and null is Python too.
+        SCRIPT.replace("SEQUENCE = {}", &format!("SEQUENCE = {sequence:#}"))
+    }
+}

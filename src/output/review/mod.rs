@@ -1,0 +1,115 @@
+//! What others need to look at a sequence: a contact sheet, a timeline for review players, and scripts that load it into Nuke
+//! and Blender with the class of each pixel laid over it.
+//!
+//! They stand in a folder beside the report, `report.review`, and refer to the frames by a relative path: the output folder can
+//! be moved as a whole.
+
+mod blender;
+mod nuke;
+mod timeline;
+
+use super::{KeyFrame, NamePattern, Thumbnails, write_alone};
+use crate::measure::picture::{contact_sheet, png};
+use crate::scene::Rational;
+use crate::{Error, Result};
+use std::collections::BTreeSet;
+use std::path::Path;
+
+/// A sequence to be looked at.
+#[derive(Debug)]
+pub struct Review<'a> {
+    /// Where the frames are.
+    pub folder: &'a Path,
+    /// What they are called.
+    pub names: &'a NamePattern,
+    /// Which there are.
+    pub frames: &'a BTreeSet<i64>,
+    /// First frames after a cut.
+    pub cuts: &'a [i64],
+    /// Frames traced in full, and why.
+    pub keyframes: &'a [KeyFrame],
+    /// Frames per second.
+    pub fps: Rational,
+    /// Pixels.
+    pub width: u32,
+    /// Pixels.
+    pub height: u32,
+    /// Whether the files hold the class of each pixel.
+    pub has_class: bool,
+}
+
+/// Pictures of a contact sheet, and how many stand side by side.
+const SHEET: (usize, usize) = (24, 6);
+
+impl Review<'_> {
+    /// Writes the folder that belongs to the report `report`.
+    ///
+    /// # Errors
+    /// [`Error::Output`].
+    pub fn write(&self, report: &Path, thumbnails: &Thumbnails) -> Result<()> {
+        let (Some(&first), Some(&last)) = (self.frames.first(), self.frames.last()) else { return Ok(()) };
+        let folder = report.with_extension("review");
+        let base = self.base(report)?;
+        write_alone(&folder.join("timeline.otio"), self.timeline(&base).as_bytes())?;
+        write_alone(&folder.join("nuke.nk"), self.nuke_script(&base, first, last).as_bytes())?;
+        write_alone(&folder.join("blender.py"), self.blender_script(&base, first, last).as_bytes())?;
+        let pictures: Vec<_> = thumbnails.beauties().into_values().collect();
+        let step = pictures.len().div_ceil(SHEET.0).max(1);
+        let pictures: Vec<_> = pictures.into_iter().step_by(step).collect();
+        let Some(width) = pictures.first().map(image::RgbImage::width) else { return Ok(()) };
+        let path = folder.join("sheet.png");
+        let sheet = png(&contact_sheet(&pictures, SHEET.1, width));
+        write_alone(&path, &sheet.map_err(|e| Error::output(&path, e.to_string()))?)
+    }
+
+    /// The frames' folder as seen from the review's, with a slash at its end: `../`, unless the report was sent elsewhere.
+    fn base(&self, report: &Path) -> Result<String> {
+        let whole = |path: &Path| path.canonicalize().map_err(|e| super::write::explain(path, &e));
+        let frames = whole(self.folder)?;
+        let beside = report.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
+        Ok(if whole(beside)? == frames { "../".into() } else { format!("{}/", frames.display()) })
+    }
+
+    /// The sequence's name.
+    fn title(&self) -> &str {
+        let title = self.names.parts().0.trim_end_matches(['.', '_', '-']);
+        if title.is_empty() { "sequence" } else { title }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn everything_is_written_beside_the_report_and_refers_to_the_frames() {
+        let folder = tempfile::tempdir().unwrap();
+        let frames: BTreeSet<i64> = (1..=3).collect();
+        let names = NamePattern::parse("<stem>.####.exr", "shot").unwrap();
+        let review = Review {
+            folder: folder.path(),
+            names: &names,
+            frames: &frames,
+            cuts: &[],
+            keyframes: &[],
+            fps: Rational { numerator: 24, denominator: 1 },
+            width: 64,
+            height: 36,
+            has_class: true,
+        };
+        review.write(&folder.path().join("report.json"), &Thumbnails::of(&frames)).unwrap();
+        let read =
+            |name: &str| std::fs::read_to_string(folder.path().join("report.review").join(name)).unwrap();
+        assert!(read("nuke.nk").contains("/../shot.%04d.exr"));
+        assert!(read("blender.py").contains("\"../\"") && read("timeline.otio").contains("\"../\""));
+        let elsewhere = folder.path().join("reports/r.json");
+        std::fs::create_dir_all(elsewhere.parent().unwrap()).unwrap();
+        review.write(&elsewhere, &Thumbnails::of(&frames)).unwrap();
+        let text = std::fs::read_to_string(folder.path().join("reports/r.review/timeline.otio")).unwrap();
+        assert!(text.contains(folder.path().canonicalize().unwrap().to_str().unwrap()));
+        let none = BTreeSet::new();
+        let empty = Review { frames: &none, ..review };
+        empty.write(&folder.path().join("none.json"), &Thumbnails::of(&none)).unwrap();
+        assert!(!folder.path().join("none.review").exists());
+    }
+}

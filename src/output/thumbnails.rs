@@ -1,0 +1,267 @@
+//! Small pictures of a run's frames, for the report and the contact sheet.
+//!
+//! They are taken as frames pass to the sink ([`WithThumbnails`]), and read from their files for frames that were there
+//! already. Their number, their size and what they take in a page are bounded, however long the sequence is.
+
+use crate::Result;
+use crate::frame::{Frame, StageSeconds};
+use crate::measure::{Exposure, Percentile, picture, read_frame};
+use crate::sequence::FrameSink;
+use base64::Engine;
+use half::f16;
+use image::codecs::jpeg::JpegEncoder;
+use image::codecs::webp::WebPEncoder;
+use image::{ExtendedColorType, ImageEncoder, RgbImage};
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::Path;
+
+/// Frames of which there are pictures at most.
+pub const MOST_FRAMES: usize = 200;
+/// Longer side of a picture, pixels, at most.
+pub const SIDE: usize = 256;
+/// Bytes that all pictures take in a page, at most.
+pub const MOST_BYTES: usize = 8 << 20;
+
+/// A frame's pictures as data URIs; none for layers that the frame does not have.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Thumbnail {
+    /// Frame number.
+    pub frame: i64,
+    /// The beauty, under the whole sequence's exposure.
+    pub beauty: String,
+    /// The class of each pixel, in colour.
+    pub class: Option<String>,
+    /// Depth, near to far.
+    pub depth: Option<String>,
+}
+
+/// The small pictures of a run, linear until all frames are known and with them the exposure.
+#[derive(Debug, Default)]
+pub struct Thumbnails {
+    chosen: BTreeSet<i64>,
+    small: BTreeMap<i64, Small>,
+    percentile: Percentile,
+}
+
+/// A frame made small.
+#[derive(Debug)]
+struct Small {
+    width: u32,
+    color: Vec<[f16; 4]>,
+    depth: Vec<f32>,
+    class: Vec<u8>,
+}
+
+impl Thumbnails {
+    /// For the run of `frames`: of all, or of [`MOST_FRAMES`] that are spread evenly.
+    pub fn of(frames: &BTreeSet<i64>) -> Self {
+        let step = frames.len().div_ceil(MOST_FRAMES).max(1);
+        Self { chosen: frames.iter().copied().step_by(step).collect(), ..Self::default() }
+    }
+
+    /// Takes a frame's pictures from its file; a file that cannot be read leaves it without.
+    pub fn read(&mut self, number: i64, file: &Path) {
+        if self.chosen.contains(&number)
+            && let Ok(frame) = read_frame(file)
+        {
+            self.add(number, frame.width, &frame.color, &frame.depth, &frame.class);
+        }
+    }
+
+    fn add(&mut self, number: i64, width: usize, color: &[[f32; 4]], depth: &[f32], class: &[u8]) {
+        if !self.chosen.contains(&number) || width == 0 || color.is_empty() {
+            return;
+        }
+        let grid = Grid::new(width, color.len() / width);
+        let color: Vec<[f32; 4]> = grid.means(color);
+        self.percentile.add(&color);
+        let small = Small {
+            width: grid.columns as u32,
+            color: color.into_iter().map(|c| c.map(f16::from_f32)).collect(),
+            depth: grid.centers(depth),
+            class: grid.centers(class),
+        };
+        self.small.insert(number, small);
+    }
+
+    /// The beauty of each frame, under one exposure.
+    pub fn beauties(&self) -> BTreeMap<i64, RgbImage> {
+        let exposure = Exposure::from_p99(self.percentile.get(0.99));
+        let draw = |small: &Small| {
+            let color: Vec<[f32; 4]> = small.color.iter().map(|c| c.map(f16::to_f32)).collect();
+            picture::beauty(&color, small.width, exposure)
+        };
+        self.small.iter().filter_map(|(&number, small)| Some((number, draw(small)?))).collect()
+    }
+
+    /// All pictures, encoded for a page. If they take more than [`MOST_BYTES`], every second frame is left out until they do
+    /// not.
+    pub fn encoded(&self) -> Vec<Thumbnail> {
+        let mut all: Vec<Thumbnail> = self
+            .beauties()
+            .into_iter()
+            .filter_map(|(frame, beauty)| {
+                let small = self.small.get(&frame)?;
+                let class = picture::classes(&small.class, small.width).filter(|_| !small.class.is_empty());
+                let depth = picture::depth(&small.depth, small.width).filter(|_| !small.depth.is_empty());
+                Some(Thumbnail {
+                    frame,
+                    beauty: jpeg(&beauty)?,
+                    class: class.and_then(|c| webp(&c)),
+                    depth: depth.and_then(|d| jpeg(&d)),
+                })
+            })
+            .collect();
+        while all.len() > 1 && all.iter().map(Thumbnail::bytes).sum::<usize>() > MOST_BYTES {
+            all = all.into_iter().step_by(2).collect();
+        }
+        all
+    }
+}
+
+impl Thumbnail {
+    fn bytes(&self) -> usize {
+        let of = |layer: &Option<String>| layer.as_ref().map_or(0, String::len);
+        self.beauty.len() + of(&self.class) + of(&self.depth)
+    }
+}
+
+/// Pixels of a large picture for each of a small one.
+struct Grid {
+    size: (usize, usize),
+    columns: usize,
+    rows: usize,
+}
+
+impl Grid {
+    fn new(width: usize, height: usize) -> Self {
+        let shrink = |side: usize| (side * SIDE / width.max(height).max(SIDE)).max(1);
+        Self { size: (width, height), columns: shrink(width), rows: shrink(height) }
+    }
+
+    /// The mean of the pixels that fall on each small one; what is not finite counts as black.
+    fn means(&self, pixels: &[[f32; 4]]) -> Vec<[f32; 4]> {
+        let (width, height) = self.size;
+        let range = |i: usize, count: usize, size: usize| {
+            i * size / count..((i + 1) * size / count).max(i * size / count + 1)
+        };
+        let mean = |column: usize, row: usize| {
+            let (mut sum, mut count) = ([0.0; 4], 0.0);
+            for y in range(row, self.rows, height) {
+                for pixel in &pixels[y * width..][range(column, self.columns, width)] {
+                    sum.iter_mut().zip(pixel).for_each(|(s, v)| *s += if v.is_finite() { *v } else { 0.0 });
+                    count += 1.0;
+                }
+            }
+            sum.map(|s| s / count)
+        };
+        self.places().map(|(column, row)| mean(column, row)).collect()
+    }
+
+    /// The pixel under the middle of each small one: numbers are not blended.
+    fn centers<T: Copy>(&self, values: &[T]) -> Vec<T> {
+        let (width, height) = self.size;
+        let middle = |i: usize, count: usize, size: usize| (2 * i + 1) * size / (2 * count);
+        let at = |(column, row)| {
+            values.get(middle(row, self.rows, height) * width + middle(column, self.columns, width)).copied()
+        };
+        self.places().filter_map(at).collect()
+    }
+
+    fn places(&self) -> impl Iterator<Item = (usize, usize)> + use<> {
+        let (columns, rows) = (self.columns, self.rows);
+        (0..rows).flat_map(move |row| (0..columns).map(move |column| (column, row)))
+    }
+}
+
+/// Photographs: small, and nobody measures them.
+fn jpeg(picture: &RgbImage) -> Option<String> {
+    let mut bytes = Vec::new();
+    JpegEncoder::new_with_quality(&mut bytes, 82).encode_image(picture).ok()?;
+    Some(uri("jpeg", &bytes))
+}
+
+/// Pictures of few colours: exact, and half of what PNG takes.
+fn webp(picture: &RgbImage) -> Option<String> {
+    let mut bytes = Vec::new();
+    let (width, height) = picture.dimensions();
+    let encoder = WebPEncoder::new_lossless(&mut bytes);
+    encoder.write_image(picture, width, height, ExtendedColorType::Rgb8).ok()?;
+    Some(uri("webp", &bytes))
+}
+
+fn uri(kind: &str, bytes: &[u8]) -> String {
+    format!("data:image/{kind};base64,{}", base64::engine::general_purpose::STANDARD.encode(bytes))
+}
+
+/// A sink that takes a small picture of each frame on its way to another.
+pub struct WithThumbnails<'a> {
+    /// Where frames go.
+    pub sink: &'a mut dyn FrameSink,
+    /// Where their pictures go.
+    pub thumbnails: &'a mut Thumbnails,
+}
+
+impl FrameSink for WithThumbnails<'_> {
+    fn blank(&mut self) -> Option<Frame> {
+        self.sink.blank()
+    }
+
+    fn put(&mut self, frame: Frame) -> Result<()> {
+        self.thumbnails.add(
+            frame.number,
+            frame.window.width as usize,
+            &frame.color,
+            &frame.depth,
+            &frame.class,
+        );
+        self.sink.put(frame)
+    }
+
+    fn finish(&mut self) -> Result<Vec<(i64, StageSeconds)>> {
+        self.sink.finish()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn pictures_are_made_small_and_never_large() {
+        let grid = Grid::new(1024, 512);
+        assert_eq!((grid.columns, grid.rows), (256, 128));
+        let pixels: Vec<[f32; 4]> = (0..1024 * 512).map(|i| [(i % 1024 / 4) as f32; 4]).collect();
+        let means = grid.means(&pixels);
+        assert!(means.iter().enumerate().all(|(i, m)| m[0] == (i % 256) as f32));
+        let classes: Vec<u8> = (0..1024 * 512).map(|i| (i % 4) as u8).collect();
+        assert!(grid.centers(&classes).iter().all(|&c| c == 2));
+        let grid = Grid::new(3, 2);
+        assert_eq!((grid.columns, grid.rows), (3, 2));
+        assert_eq!(grid.centers(&[1, 2, 3, 4, 5, 6]), [1, 2, 3, 4, 5, 6]);
+        assert_eq!(grid.centers::<u8>(&[]), [0; 0]);
+        assert_eq!((Grid::new(100_000, 10).columns, Grid::new(100_000, 10).rows), (256, 1));
+    }
+
+    #[test]
+    fn the_number_of_frames_and_bytes_is_bounded() {
+        let frames: BTreeSet<i64> = (-500..500).collect();
+        let mut thumbnails = Thumbnails::of(&frames);
+        assert_eq!(thumbnails.chosen.len(), MOST_FRAMES);
+        assert!(thumbnails.chosen.contains(&-500));
+        // Noise is the worst that can be.
+        let noise = |i: usize| ((i * 2_654_435_761) % 1009) as f32 / 1009.0;
+        let color: Vec<[f32; 4]> =
+            (0..256 * 256).map(|i| [noise(i), noise(i + 7), noise(i + 99), 1.0]).collect();
+        let class: Vec<u8> = (0..256 * 256).map(|i| (noise(i) * 10.0) as u8).collect();
+        for frame in &frames {
+            thumbnails.add(*frame, 256, &color, &[], &class);
+        }
+        assert_eq!(thumbnails.beauties().len(), MOST_FRAMES);
+        let encoded = thumbnails.encoded();
+        assert!(encoded.len() < MOST_FRAMES && encoded.len() > 20, "{}", encoded.len());
+        assert!(encoded.iter().map(Thumbnail::bytes).sum::<usize>() <= MOST_BYTES);
+        assert!(encoded[0].beauty.starts_with("data:image/jpeg") && encoded[0].depth.is_none());
+        assert!(encoded[0].class.as_ref().is_some_and(|c| c.starts_with("data:image/webp")));
+    }
+}
