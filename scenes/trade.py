@@ -124,12 +124,21 @@ def main() -> None:
         chains += chain(name, trade)
         spans.append(f"{name} {', '.join(f'{a}-{b}' for a, b in trade['spans'])}")
         noise.append(max(m["summary"]["noise"] for m in trade["qualities"]))
+        write(args.resolution, measured, chains, spans, max(noise))
+
+
+def write(resolution: str, measured: list[list[str]], chains: list[list[str]], spans: list[str], noise: float) -> None:
+    """Writes docs/trade.md as far as it is known: after each scene, so that a run that is stopped leaves something."""
     commit = run("git", "-C", str(ROOT), "rev-parse", "--short", "HEAD").strip()
     machine = f"{len(os.sched_getaffinity(0))} cores of {processor()}"
-    text = (HEAD.format(commit=commit, machine=machine, resolution=args.resolution, noise=100 * max(noise))
-            + table(TITLES, measured) + MIDDLE + table(["scene", "quality", *map(str, DISTANCES)], chains)
-            + "\nSegments measured: " + "; ".join(spans) + ".\n")
-    (ROOT / "docs" / "trade.md").write_text(text)
+    parts = [
+        HEAD.format(commit=commit, machine=machine, resolution=resolution, noise=100 * noise),
+        table(TITLES, measured),
+        MIDDLE,
+        table(["scene", "quality", *map(str, DISTANCES)], chains),
+        "\nSegments measured: " + "; ".join(spans) + ".\n",
+    ]
+    (ROOT / "docs" / "trade.md").write_text("".join(parts))
 
 
 HEAD = """# What each quality costs

@@ -12,6 +12,7 @@ use half::f16;
 use image::codecs::jpeg::JpegEncoder;
 use image::codecs::webp::WebPEncoder;
 use image::{ExtendedColorType, ImageEncoder, RgbImage};
+use rayon::prelude::*;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
@@ -91,7 +92,7 @@ impl Thumbnails {
             let color: Vec<[f32; 4]> = small.color.iter().map(|c| c.map(f16::to_f32)).collect();
             picture::beauty(&color, small.width, exposure)
         };
-        self.small.iter().filter_map(|(&number, small)| Some((number, draw(small)?))).collect()
+        self.small.par_iter().filter_map(|(&number, small)| Some((number, draw(small)?))).collect()
     }
 
     /// All pictures, encoded for a page. If they take more than [`MOST_BYTES`], every second frame is left out until they do
@@ -99,7 +100,7 @@ impl Thumbnails {
     pub fn encoded(&self) -> Vec<Thumbnail> {
         let mut all: Vec<Thumbnail> = self
             .beauties()
-            .into_iter()
+            .into_par_iter()
             .filter_map(|(frame, beauty)| {
                 let small = self.small.get(&frame)?;
                 let class = picture::classes(&small.class, small.width).filter(|_| !small.class.is_empty());
@@ -155,22 +156,18 @@ impl Grid {
             }
             sum.map(|s| s / count)
         };
-        self.places().map(|(column, row)| mean(column, row)).collect()
+        let row = |row: usize| (0..self.columns).map(move |column| mean(column, row));
+        (0..self.rows).into_par_iter().flat_map_iter(row).collect()
     }
 
     /// The pixel under the middle of each small one: numbers are not blended.
     fn centers<T: Copy>(&self, values: &[T]) -> Vec<T> {
         let (width, height) = self.size;
         let middle = |i: usize, count: usize, size: usize| (2 * i + 1) * size / (2 * count);
-        let at = |(column, row)| {
-            values.get(middle(row, self.rows, height) * width + middle(column, self.columns, width)).copied()
-        };
-        self.places().filter_map(at).collect()
-    }
-
-    fn places(&self) -> impl Iterator<Item = (usize, usize)> + use<> {
-        let (columns, rows) = (self.columns, self.rows);
-        (0..rows).flat_map(move |row| (0..columns).map(move |column| (column, row)))
+        let row = |row: usize| middle(row, self.rows, height) * width;
+        let places = (0..self.rows)
+            .flat_map(|y| (0..self.columns).map(move |x| row(y) + middle(x, self.columns, width)));
+        places.filter_map(|i| values.get(i).copied()).collect()
     }
 }
 

@@ -1,6 +1,7 @@
 //! The measurements as a table for people and as rows for spreadsheets.
 
 use super::{Measured, Spread, Trade};
+use crate::frame::RayCounts;
 use std::fmt;
 
 /// Titles of [`row`].
@@ -50,13 +51,9 @@ fn milliseconds(seconds: f64) -> String {
 
 /// What stands under the table.
 pub(crate) fn notes(trade: &Trade) -> Vec<String> {
-    let hidden = trade.qualities.iter().filter_map(|m| {
-        let share = m.summary.hidden?;
-        Some(format!("{}: {:.3} % of reused samples are hidden", m.quality, 100.0 * share))
-    });
+    let mut notes: Vec<String> = trade.qualities.iter().map(rays).collect();
     let spans: Vec<String> = trade.spans.iter().map(|[first, last]| format!("{first}-{last}")).collect();
     let noise = trade.qualities.iter().map(|m| m.summary.noise).fold(0.0, f64::max);
-    let mut notes: Vec<String> = hidden.collect();
     notes.push(format!(
         "segments measured: {}; {}x{}, {} threads",
         spans.join(", "),
@@ -70,6 +67,26 @@ pub(crate) fn notes(trade: &Trade) -> Vec<String> {
         100.0 * noise
     ));
     notes
+}
+
+/// A quality's rays by kind, and what of its samples should not be seen.
+fn rays(measured: &Measured) -> String {
+    let s = &measured.summary;
+    let RayCounts { primary, shadow, ambient, reflection, refraction, visibility } = s.rays;
+    let share = s.rays_per_pixel / s.rays.total().max(1) as f64;
+    let kinds = [
+        (primary, "primary"),
+        (visibility, "visibility"),
+        (shadow, "shadow"),
+        (ambient, "ambient"),
+        (reflection, "reflection"),
+        (refraction, "refraction"),
+    ];
+    let cast = kinds.into_iter().filter(|(count, _)| *count > 0);
+    let cast: Vec<String> = cast.map(|(count, kind)| format!("{:.3} {kind}", count as f64 * share)).collect();
+    let hidden =
+        s.hidden.map(|h| format!("; {:.3} % of reused samples are hidden", 100.0 * h)).unwrap_or_default();
+    format!("{}: rays a pixel: {}{hidden}", measured.quality, cast.join(", "))
 }
 
 impl Trade {

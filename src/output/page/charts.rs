@@ -2,8 +2,9 @@
 
 use super::{escaped, grouped, percent};
 use crate::frame::{PixelClass, RayCounts};
-use crate::output::report::{FrameReport, Report};
+use crate::output::report::{FrameReport, KeyFrame, Report};
 use serde_json::{Map, Value};
+use std::collections::HashSet;
 
 /// Width of all charts, in units of their own.
 const WIDTH: f64 = 1000.0;
@@ -62,7 +63,7 @@ impl Report {
         self.chart("Timeline", &note, 40.0, &bars)
     }
 
-    /// Why there are key frames: how many for each reason.
+    /// Why there are key frames among the frames of the run: how many for each reason.
     fn reasons(&self) -> String {
         let explained = [
             ("first", "at the start"),
@@ -71,7 +72,9 @@ impl Report {
             ("length", "where samples had been carried on far enough"),
             ("only", "the only frame"),
         ];
-        let count = |name: &str| self.plan.keyframes.iter().filter(|k| k.reason == name).count();
+        let traced: HashSet<i64> = self.frames.iter().filter(|f| f.from.is_none()).map(|f| f.frame).collect();
+        let here = |k: &&KeyFrame| traced.contains(&k.frame);
+        let count = |name: &str| self.plan.keyframes.iter().filter(here).filter(|k| k.reason == name).count();
         let found = explained.iter().filter(|(name, _)| count(name) > 0);
         let reasons: Vec<String> =
             found.map(|(name, why)| format!("{} {why} ({name})", count(name))).collect();
