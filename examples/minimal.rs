@@ -23,7 +23,11 @@ fn main() -> buzz::Result<()> {
 
     let (settings, mut accel) = (Settings::new(320, 180), Accel::new(&scene));
     let path = camera_path(&scene, &mut accel, &settings, &Unwatched)?;
-    let plan = plan(&path, &[], PlanOptions { quality: settings.quality, longest_segment: LONGEST_SEGMENT });
+    let plan = plan(
+        &path,
+        &[],
+        PlanOptions { quality: settings.quality, longest_segment: LONGEST_SEGMENT, workers: 1 },
+    );
     let frames = (0..=24).collect();
     let mut sink = MemorySink::default();
     render_sequence(&scene, &mut accel, &settings, &plan, &frames, &mut sink, &mut Unwatched)?;

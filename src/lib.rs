@@ -33,7 +33,7 @@
 //!
 //! let (settings, mut accel) = (Settings::new(32, 18), Accel::new(&scene));
 //! let path = camera_path(&scene, &mut accel, &settings, &Unwatched)?;
-//! let plan = plan(&path, &[], PlanOptions { quality: settings.quality, longest_segment: LONGEST_SEGMENT });
+//! let plan = plan(&path, &[], PlanOptions { quality: settings.quality, longest_segment: LONGEST_SEGMENT, workers: 1 });
 //! let mut sink = MemorySink::default();
 //! render_sequence(&scene, &mut accel, &settings, &plan, &(0..=1).collect(), &mut sink, &mut Unwatched)?;
 //! assert_eq!(sink.frames.len(), 2);

@@ -55,7 +55,8 @@ fn check(file: &Path) {
     let settings = Settings::new(width, height);
     let path = camera_path(&scene, &mut Accel::new(&scene), &settings, &Unwatched).unwrap();
     let cuts: Vec<i64> = scene.cuts.iter().map(|c| c.frame).collect();
-    let make = |quality| plan(&path, &cuts, PlanOptions { quality, longest_segment: LONGEST_SEGMENT });
+    let make =
+        |quality| plan(&path, &cuts, PlanOptions { quality, longest_segment: LONGEST_SEGMENT, workers: 1 });
     let (inferring, full) = (make(Quality::HalfPixel), make(Quality::Full));
     let frames = some_frames(&inferring);
     let truth = render(&scene, &full, &frames, None);

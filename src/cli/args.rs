@@ -58,9 +58,15 @@ pub struct PlanArgs {
     pub scene: SceneArgs,
     #[command(flatten)]
     pub image: ImageArgs,
-    /// How to print.
+    /// Plan for so many machines that render at the same time: the last one is done as soon as possible.
+    #[arg(long, value_name = "N", default_value_t = 1, allow_negative_numbers = true, value_parser = clap::value_parser!(u32).range(1..=1024))]
+    pub workers: u32,
+    /// How to print; openjd is a job for a render farm.
     #[arg(long, value_enum, default_value = "text")]
-    pub format: Format,
+    pub format: PlanFormat,
+    /// Options that the tasks of --format openjd convert with, besides those given here: -- --aov all.
+    #[arg(last = true, value_name = "CONVERT OPTIONS", allow_hyphen_values = true)]
+    pub convert: Vec<String>,
 }
 
 #[derive(Debug, Args)]
@@ -161,7 +167,7 @@ pub struct RenderArgs {
 
 #[derive(Debug, Args)]
 pub struct OutputArgs {
-    /// Frames: 1-100, 1-100x2, 1-10,20-30, -3--1 [default: the scene's own range].
+    /// Frames: 1-100, 1-100x2, 1-10,20-30, -3--1, 1-20&10-30 (those in both) [default: the scene's own range].
     #[arg(short, long, allow_hyphen_values = true)]
     pub frames: Option<String>,
     /// Render only this part: x,y,width,height in pixels of the full frame.
@@ -204,6 +210,12 @@ pub struct OutputArgs {
     /// Where to write the report [default: report.json in the output folder].
     #[arg(long, value_name = "FILE")]
     pub report: Option<PathBuf>,
+    /// Replay a plan that plan --format json has printed.
+    #[arg(long, value_name = "FILE", conflicts_with = "segment")]
+    pub plan: Option<PathBuf>,
+    /// Refuse to render if the estimate of the memory it takes is over this: 2GiB.
+    #[arg(long, value_name = "SIZE")]
+    pub memory: Option<String>,
     /// How to show progress.
     #[arg(long, value_enum, default_value = "auto")]
     pub progress: ProgressArg,
@@ -213,6 +225,14 @@ pub struct OutputArgs {
 pub enum Format {
     Text,
     Json,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum PlanFormat {
+    Text,
+    Json,
+    /// Open Job Description: a template for openjd run and Deadline Cloud.
+    Openjd,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]

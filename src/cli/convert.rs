@@ -3,29 +3,30 @@
 use super::args::{CompressionArg, ConvertArgs};
 use super::interrupt::Interrupt;
 use super::job::{Job, stem, warn_of_ignored};
-use super::parse;
+use super::plan_file::PlanFile;
 use super::progress::{Progress, Tally};
 use super::say;
+use super::{memory, parse};
 use anyhow::{Context, Result};
 use buzz::error::Error;
 use buzz::frame::{Aov, FrameKind, FrameStats};
 use buzz::infer::BuzzBuffer;
 use buzz::output::{
-    self, Compression, ExrSink, FileOptions, FrameFile, FrameRecord, KeyFrame, NamePattern, OutputFolder,
-    Report, ReportInput, Review, RunSeconds, SceneSummary, SegmentRange, SettingsHash, SettingsHasher,
-    Thumbnails, WithThumbnails, peak_bytes,
+    self, Compression, ExrSink, FileOptions, FrameFile, FrameRecord, NamePattern, OutputFolder, Report,
+    ReportInput, Review, Run, RunSeconds, SceneSummary, SettingsHash, SettingsHasher, Thumbnails,
+    WithThumbnails, earlier_runs, peak_bytes,
 };
-use buzz::plan::Plan;
+use buzz::plan::{Plan, Segment};
 use buzz::scene::Requirements;
 use buzz::sequence::{FrameSink, Observer, render_sequence};
 use buzz::trace::lit_words;
 use std::collections::BTreeSet;
 use std::path::Path;
 use std::process::ExitCode;
-use std::time::Instant;
+use std::time::{Instant, SystemTime, UNIX_EPOCH};
 
 pub fn run(args: ConvertArgs) -> Result<ExitCode> {
-    let start = Instant::now();
+    let (started, start) = (SystemTime::now(), Instant::now());
     let (Some(input), Some(out_dir)) = (&args.input, &args.out_dir) else {
         return Err(Error::Usage("INPUT and OUT_DIR are missing".into()).into());
     };
@@ -33,13 +34,21 @@ pub fn run(args: ConvertArgs) -> Result<ExitCode> {
     let names =
         NamePattern::parse(args.output.name.as_deref().unwrap_or(NamePattern::DEFAULT), &stem(input))?;
     let asked = args.output.frames.as_deref().map(parse::frames).transpose()?;
+    if asked.as_ref().is_some_and(BTreeSet::is_empty) {
+        say::line("no frame is asked for: nothing to do");
+        return Ok(ExitCode::SUCCESS);
+    }
+    let replayed = args.output.plan.as_deref().map(PlanFile::read).transpose()?;
     let mut job = Job::new(input, &args.scene, &args.image.render, args.image.quality)?;
     warn_of_ignored(&job.scene);
     choose_image(&mut job, &args)?;
+    let memory_limit = args.output.memory.as_deref().map(parse::memory).transpose()?;
     let timing = job.scene.timing;
     let frames = asked.unwrap_or_else(|| (timing.first..=timing.last).collect());
 
-    let hash = settings_hash(&job, &args);
+    let whole = frames == (timing.first..=timing.last).collect();
+    let report_path = args.output.report.clone().unwrap_or_else(|| out_dir.join(report_name(&frames, whole)));
+
     interrupt.writing();
     if let Some(path) = &args.output.report {
         prepare_report(path)?;
@@ -51,19 +60,25 @@ pub fn run(args: ConvertArgs) -> Result<ExitCode> {
             "warning: {path}: the file system has no locks: do not run twice on the same frames"
         ));
     }
+    let planning = Instant::now();
+    let plan = match &replayed {
+        Some(file) => job.replay(file, &*interrupt)?,
+        None => job.plan(1, &*interrupt)?,
+    };
+    let plan_seconds = planning.elapsed().as_secs_f64();
+    let hash = settings_hash(&job, &plan, &args);
     let skipped = existing(&folder, &frames, &hash, &args, &interrupt)?;
     let to_render: BTreeSet<i64> =
         frames.difference(&skipped.iter().map(|r| r.number).collect()).copied().collect();
-
-    let planning = Instant::now();
-    let plan = job.plan(&*interrupt)?;
-    let plan_seconds = planning.elapsed().as_secs_f64();
+    if let Some(limit) = memory_limit.filter(|_| !to_render.is_empty()) {
+        memory::refuse_over(limit, &job)?;
+    }
 
     let options = FileOptions {
         compression: compression(args.output.compression),
         fps: timing.fps,
         quality: job.settings.quality.name().into(),
-        settings_hash: hash,
+        settings_hash: hash.clone(),
     };
     let mut sink = ExrSink::new(folder, options)?;
     let pixels = job.settings.window.pixels() as u64;
@@ -93,17 +108,24 @@ pub fn run(args: ConvertArgs) -> Result<ExitCode> {
         ));
     }
 
+    let (report_folder, report_name) = place_of(&report_path);
+    let mut runs = earlier_runs(&mut records, report_folder, &report_name, &hash);
     let seconds = RunSeconds {
         import: job.import_seconds,
         accel: job.accel_seconds,
         plan: plan_seconds,
         wall: start.elapsed().as_secs_f64(),
     };
-    let report = report(input, &job, &plan, records, seconds);
-    let whole = frames == (timing.first..=timing.last).collect();
-    let path = args.output.report.clone().unwrap_or_else(|| out_dir.join(report_name(&frames, whole)));
-    report.write_json(&path)?;
-    report.write_html(&path.with_extension("html"), &thumbnails.encoded())?;
+    runs.push(Run {
+        report: report_name,
+        started: started.duration_since(UNIX_EPOCH).map_or(0, |since| since.as_millis() as u64),
+        threads: job.threads,
+        seconds,
+        peak_bytes: peak_bytes(),
+    });
+    let report = report(input, hash, &job, &plan, records, runs);
+    report.write_json(&report_path)?;
+    report.write_html(&report_path.with_extension("html"), &thumbnails.encoded())?;
     let review = Review {
         folder: out_dir,
         names: sink.folder().names(),
@@ -115,7 +137,7 @@ pub fn run(args: ConvertArgs) -> Result<ExitCode> {
         height: job.settings.height,
         has_class: job.settings.aovs.contains(Aov::Class),
     };
-    review.write(&path, &thumbnails)?;
+    review.write(&report_path, &thumbnails)?;
     say::result(&summary(&report))?;
     Ok(ExitCode::SUCCESS)
 }
@@ -130,10 +152,16 @@ pub(super) fn prepare_report(path: &Path) -> Result<()> {
     if path.is_dir() {
         return Err(Error::output(path, "is a folder; name a file in it").into());
     }
-    let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let (folder, _) = place_of(path);
     let made = std::fs::create_dir_all(folder).and_then(|()| tempfile::tempfile_in(folder));
     made.map_err(|e| Error::output(path, format!("the report cannot be written there ({e})")))?;
     Ok(())
+}
+
+/// The folder of a file, and its name in it.
+fn place_of(path: &Path) -> (&Path, String) {
+    let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    (folder, path.file_name().unwrap_or_default().to_string_lossy().into_owned())
 }
 
 /// Resolves what depends on the image's size.
@@ -157,15 +185,20 @@ fn choose_image(job: &mut Job, args: &ConvertArgs) -> Result<()> {
     Ok(())
 }
 
-/// Identifies everything that decides the pixels: the scene as read, the settings, and the program's version.
-fn settings_hash(job: &Job, args: &ConvertArgs) -> SettingsHash {
+/// Identifies everything that decides the pixels: the scene as read, the settings, the plan, and the program's version.
+fn settings_hash(job: &Job, plan: &Plan, args: &ConvertArgs) -> SettingsHash {
     let mut hasher = SettingsHasher::new();
     let mut settings = job.settings.clone();
     settings.audit = false;
     hasher.feed("version", env!("CARGO_PKG_VERSION"));
     hasher.feed("settings", format!("{settings:?}"));
     hasher.feed("quality", job.settings.quality.name());
-    hasher.feed("segment", job.longest_segment.to_le_bytes());
+    for Segment { key, first, last } in &plan.segments {
+        hasher.feed("segment", [key, first, last].map(|n| n.to_le_bytes()).concat());
+    }
+    for cut in &plan.cuts {
+        hasher.feed("cut", cut.to_le_bytes());
+    }
     hasher.feed("compression", format!("{:?}", args.output.compression));
     job.scene.digest(&mut |name, bytes| {
         hasher.feed(name, bytes);
@@ -236,13 +269,18 @@ impl Observer for Recorder {
     }
 }
 
-fn report(input: &Path, job: &Job, plan: &Plan, frames: Vec<FrameRecord>, seconds: RunSeconds) -> Report {
+fn report(
+    input: &Path,
+    settings_hash: SettingsHash,
+    job: &Job,
+    plan: &Plan,
+    frames: Vec<FrameRecord>,
+    runs: Vec<Run>,
+) -> Report {
     let scene = &job.scene;
-    let keyframes =
-        plan.keyframes.iter().map(|k| KeyFrame { frame: k.frame, reason: k.reason.name().into() });
-    let segments = plan.segments.iter().map(|s| SegmentRange { key: s.key, first: s.first, last: s.last });
     Report::new(ReportInput {
         input: input.display().to_string(),
+        settings_hash,
         settings: output::Settings {
             quality: job.settings.quality.name().into(),
             width: job.settings.width,
@@ -260,14 +298,9 @@ fn report(input: &Path, job: &Job, plan: &Plan, frames: Vec<FrameRecord>, second
             ignored: scene.ignored.iter().map(Into::into).collect(),
             bytes_per_pixel: BuzzBuffer::bytes_per_pixel(lit_words(scene, job.settings.trace_options())),
         },
-        plan: output::Plan {
-            keyframes: keyframes.collect(),
-            segments: segments.collect(),
-            cuts: plan.cuts.clone(),
-        },
+        plan: plan.into(),
         frames,
-        seconds,
-        peak_bytes: peak_bytes(),
+        runs,
         warnings: Vec::new(),
     })
 }
@@ -282,9 +315,13 @@ fn summary(report: &Report) -> String {
     }
     let saved = tally.saved().map(|s| format!("{:.1} % of camera and shadow rays saved", 100.0 * s));
     let hidden = totals.hidden.map(|h| format!("; {h} reused samples hidden")).unwrap_or_default();
+    let runs = match report.runs.len() {
+        0 | 1 => String::new(),
+        n => format!(" of {n} runs added up"),
+    };
     let s = &totals.seconds;
     format!(
-        "{} {frames}: {} traced, {} inferred, in {:.1} s\n{}{hidden}\n\
+        "{} {frames}: {} traced, {} inferred, in {:.1} s{runs}\n{}{hidden}\n\
          seconds: {:.1} reading, {:.1} trees, {:.1} plan, {:.1} infer, {:.1} trace, {:.1} enhance, \
          {:.1} write (beside)\n",
         totals.frames,

@@ -1,12 +1,13 @@
 //! Arguments as meant: the scene read, the camera chosen, sizes and ranges resolved.
 
 use super::args::{QualityArg, RenderArgs, SceneArgs};
+use super::plan_file::PlanFile;
 use super::{parse, say};
 use anyhow::{Context, Result};
 use buzz::accel::Accel;
 use buzz::error::Error;
 use buzz::import::{ImportOptions, import};
-use buzz::plan::{Plan, PlanOptions, plan};
+use buzz::plan::{PathFrame, Plan, PlanOptions, plan, replay};
 use buzz::scene::{Ignored, Scene};
 use buzz::sequence::{Observer, Quality, Settings, camera_path};
 use std::path::Path;
@@ -67,15 +68,37 @@ impl Job {
         };
     }
 
-    /// Plans the scene's own range.
-    pub fn plan(&mut self, observer: &dyn Observer) -> Result<Plan> {
-        let path = camera_path(&self.scene, &mut self.accel, &self.settings, observer)?;
+    /// Plans the scene's own range for so many machines.
+    pub fn plan(&mut self, workers: usize, observer: &dyn Observer) -> Result<Plan> {
+        let path = self.path(observer)?;
         let quality = self.settings.quality;
-        let cuts: Vec<i64> = match self.settings.camera {
+        let options = PlanOptions { quality, longest_segment: self.longest_segment, workers };
+        Ok(plan(&path, &self.cuts(), options))
+    }
+
+    /// Replays the plan of a file.
+    pub fn replay(&mut self, file: &PlanFile, observer: &dyn Observer) -> Result<Plan> {
+        let quality = self.settings.quality;
+        if quality == Quality::Full && file.infers() {
+            let message = "--plan: its frames are inferred from others, but --quality full traces every frame; leave one of them out";
+            return Err(Error::Usage(message.into()).into());
+        }
+        let segments = file.segments(self.scene.timing.fps)?;
+        let path = self.path(observer)?;
+        let unfit = |what| file.unfit("/segments", format!("{what}; make a new plan of this scene"));
+        Ok(replay(&path, &self.cuts(), quality, &segments, file.cuts()).map_err(unfit)?)
+    }
+
+    fn path(&mut self, observer: &dyn Observer) -> Result<Vec<PathFrame>> {
+        Ok(camera_path(&self.scene, &mut self.accel, &self.settings, observer)?)
+    }
+
+    /// The cuts that the scene names; none where one camera is chosen instead.
+    fn cuts(&self) -> Vec<i64> {
+        match self.settings.camera {
             Some(_) => Vec::new(),
             None => self.scene.cuts.iter().map(|c| c.frame).collect(),
-        };
-        Ok(plan(&path, &cuts, PlanOptions { quality, longest_segment: self.longest_segment }))
+        }
     }
 }
 

@@ -20,11 +20,17 @@ pub fn is_frame_number(number: i64) -> bool {
     (-1_000_000_000..=1_000_000_000).contains(&number)
 }
 
-/// `1-100`, `1-100x2`, `1-7:2`, `1-10,20-30`, `7-7`, `7`, `-3--1`.
+/// `1-100`, `1-100x2`, `1-7:2`, `1-10,20-30`, `7-7`, `7`, `-3--1`; `1-20&10-30` are the frames in both, of which there
+/// may be none.
 pub fn frames(text: &str) -> Result<BTreeSet<i64>> {
+    let lists = text.split('&').map(|list| frame_list(text, list)).collect::<Result<Vec<_>>>()?;
+    Ok(lists.into_iter().reduce(|a, b| &a & &b).unwrap_or_default())
+}
+
+fn frame_list(text: &str, list: &str) -> Result<BTreeSet<i64>> {
     let error = || usage("--frames", text, "ranges like 1-100, 1-100x2 or 1-10,20-30, first to last");
     let mut found = BTreeSet::new();
-    for part in text.split(',') {
+    for part in list.split(',') {
         let (range, step) = match part.split_once(['x', ':']) {
             Some((range, step)) => {
                 (range, step.trim().parse::<i64>().ok().filter(|&s| s > 0).ok_or_else(error)?)
@@ -73,6 +79,27 @@ pub fn fps(text: &str) -> Result<Rational> {
     let scale = if rate.fract() == 0.0 { 1 } else { 1000 };
     let numerator = (rate * f64::from(scale)).round() as u32;
     if numerator > 0 { Ok(Rational { numerator, denominator: scale }) } else { Err(error()) }
+}
+
+/// `2GiB`, `512MiB`, `1.5GB`, or a number of bytes.
+pub fn memory(text: &str) -> Result<u64> {
+    let error = || usage("--memory", text, "a size like 2GiB or 512MiB");
+    let unit = text.trim_start_matches(|c: char| c.is_ascii_digit() || c == '.');
+    let scale = match unit.trim().to_ascii_lowercase().as_str() {
+        "" | "b" => 1.0,
+        "kb" => 1e3,
+        "mb" => 1e6,
+        "gb" => 1e9,
+        "tb" => 1e12,
+        "kib" | "k" => 1024.0,
+        "mib" | "m" => 1024f64.powi(2),
+        "gib" | "g" => 1024f64.powi(3),
+        "tib" | "t" => 1024f64.powi(4),
+        _ => return Err(error()),
+    };
+    let number: f64 = text[..text.len() - unit.len()].parse().map_err(|_| error())?;
+    let bytes = number * scale;
+    if bytes >= 1.0 && bytes < u64::MAX as f64 { Ok(bytes as u64) } else { Err(error()) }
 }
 
 /// Longest side that is accepted.
@@ -168,7 +195,10 @@ mod tests {
         assert_eq!(list("7-7"), [7]);
         assert_eq!(list("4,5,20"), [4, 5, 20]);
         assert_eq!(list("1-2,10-11"), [1, 2, 10, 11]);
-        for bad in ["", "a", "5-1", "1-5x0", "1--", "1-99999999999", "--", "1-5x"] {
+        assert_eq!(list("1-4&3-9"), [3, 4]);
+        assert_eq!(list("1-20x2&1,4-7&-9-6"), [1, 5]);
+        assert_eq!(list("1-4&5-9"), [0; 0]);
+        for bad in ["1-4&", "&1", "", "a", "5-1", "1-5x0", "1--", "1-99999999999", "--", "1-5x"] {
             assert!(frames(bad).is_err(), "{bad}");
         }
     }
@@ -186,6 +216,23 @@ mod tests {
         }
         for bad in ["0", "-1", "24/0", "x", "nan", "inf", "0.0001"] {
             assert!(fps(bad).is_err(), "{bad}");
+        }
+    }
+
+    #[test]
+    fn sizes_of_memory_have_units() {
+        for (text, bytes) in [
+            ("2GiB", 2 << 30),
+            ("512MiB", 512 << 20),
+            ("1.5GB", 1_500_000_000),
+            ("64k", 65_536),
+            ("7", 7),
+            ("8 mib", 8 << 20),
+        ] {
+            assert_eq!(memory(text).unwrap(), bytes, "{text}");
+        }
+        for bad in ["", "GiB", "-1GiB", "2 gigs", "0", "1e9", "nan", "99999999TiB"] {
+            assert!(memory(bad).is_err(), "{bad}");
         }
     }
 

@@ -1,9 +1,11 @@
 //! `buzz-convert plan`: what would be rendered, and why.
 
-use super::args::{Format, PlanArgs};
+use super::args::{PlanArgs, PlanFormat};
 use super::job::{Job, warn_of_ignored};
-use super::say;
+use super::plan_file::PlanFile;
+use super::{openjd, say};
 use anyhow::Result;
+use buzz::error::Error;
 use buzz::frame::FrameKind;
 use buzz::plan::Plan;
 use buzz::scene::Projection;
@@ -12,28 +14,28 @@ use serde_json::{Value, json};
 use std::process::ExitCode;
 
 pub fn run(args: PlanArgs) -> Result<ExitCode> {
+    if !args.convert.is_empty() && args.format != PlanFormat::Openjd {
+        let message =
+            format!("{}: a plan takes it only for the tasks of --format openjd", args.convert.join(" "));
+        return Err(Error::Usage(message).into());
+    }
     let mut job = Job::new(&args.input, &args.scene, &args.image.render, args.image.quality)?;
     warn_of_ignored(&job.scene);
-    let plan = job.plan(&Unwatched)?;
+    let plan = job.plan(args.workers as usize, &Unwatched)?;
     say::result(&match args.format {
-        Format::Json => serde_json::to_string_pretty(&as_json(&job, &plan))? + "\n",
-        Format::Text => as_text(&plan),
+        PlanFormat::Json => serde_json::to_string_pretty(&as_json(&job, &plan)?)? + "\n",
+        PlanFormat::Openjd => serde_json::to_string_pretty(&openjd::template(&args, &job, &plan)?)? + "\n",
+        PlanFormat::Text => as_text(&plan),
     })?;
     Ok(ExitCode::SUCCESS)
 }
 
-fn as_json(job: &Job, plan: &Plan) -> Value {
-    let fps = job.scene.timing.fps;
-    let keyframes = plan.keyframes.iter().map(|k| json!({"frame": k.frame, "reason": k.reason.name()}));
-    let segments = plan.segments.iter().map(|s| json!({"key": s.key, "first": s.first, "last": s.last}));
-    json!({
-        "schema": "buzz-plan/1",
-        "fps": [fps.numerator, fps.denominator],
-        "frames": plan.frames.iter().map(|f| frame_as_json(job, f)).collect::<Vec<_>>(),
-        "keyframes": keyframes.collect::<Vec<_>>(),
-        "segments": segments.collect::<Vec<_>>(),
-        "cuts": plan.cuts,
-    })
+fn as_json(job: &Job, plan: &Plan) -> Result<Value> {
+    let mut value = serde_json::to_value(PlanFile::new(plan, job.scene.timing.fps))?;
+    value["frames"] = plan.frames.iter().map(|f| frame_as_json(job, f)).collect();
+    value["shares"] =
+        plan.shares.iter().map(|s| json!({"first": s.first, "last": s.last, "cost": s.cost})).collect();
+    Ok(value)
 }
 
 fn frame_as_json(job: &Job, planned: &buzz::plan::PlannedFrame) -> Value {
@@ -75,6 +77,17 @@ fn as_text(plan: &Plan) -> String {
             key.reason.name(),
             traced * 100.0
         );
+    }
+    if let [_, _, ..] = plan.shares.as_slice() {
+        for (i, share) in plan.shares.iter().enumerate() {
+            text += &format!(
+                "worker {}: frames {}-{}, the work of {:.1} frames traced in full, predicted\n",
+                i + 1,
+                share.first,
+                share.last,
+                share.cost
+            );
+        }
     }
     let traced: f64 = plan.frames.iter().map(|f| f.predicted_traced).sum();
     text += &format!(

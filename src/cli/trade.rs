@@ -24,7 +24,7 @@ pub fn run(args: TradeArgs) -> Result<ExitCode> {
     let mut candidates = Vec::new();
     for &quality in QualityArg::value_variants() {
         job.choose_quality(quality);
-        let plan = job.plan(&*interrupt)?;
+        let plan = job.plan(1, &*interrupt)?;
         candidates.push(Candidate { settings: job.settings.clone(), plan });
     }
     // The truth comes first.

@@ -43,6 +43,38 @@ pub enum Aov {
     Crypto,
 }
 
+impl Aov {
+    /// All of them.
+    pub const ALL: [Self; 10] = [
+        Self::Depth,
+        Self::Class,
+        Self::Normal,
+        Self::Position,
+        Self::Motion,
+        Self::Object,
+        Self::Diffuse,
+        Self::Specular,
+        Self::Emission,
+        Self::Lights,
+    ];
+
+    /// Bytes that a pixel of the layer takes in a [`Frame`], where there are so many lights.
+    fn bytes_per_pixel(self, lights: usize) -> usize {
+        match self {
+            Self::Class => size_of::<u8>(),
+            Self::Depth => size_of::<f32>(),
+            Self::Object => size_of::<u32>(),
+            Self::Motion => 2 * size_of::<[f32; 2]>(),
+            Self::Normal | Self::Position | Self::Diffuse | Self::Specular | Self::Emission => {
+                size_of::<[f32; 3]>()
+            }
+            Self::Lights => lights * size_of::<[f32; 3]>(),
+            // Objects and materials: a number in the frame, two ranks of identifier and coverage in the file.
+            Self::Crypto => 2 * (size_of::<u32>() + size_of::<[f32; 4]>()),
+        }
+    }
+}
+
 /// Which layers are wanted.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct AovSet(u16);
@@ -57,6 +89,12 @@ impl AovSet {
     /// True if `aov` is wanted.
     pub fn contains(self, aov: Aov) -> bool {
         self.0 & 1 << aov as u16 != 0
+    }
+
+    /// Bytes that a pixel of a [`Frame`] with these layers takes, the beauty included, where there are so many lights.
+    pub fn bytes_per_pixel(self, lights: usize) -> usize {
+        let layers = Aov::ALL.into_iter().filter(|&aov| self.contains(aov));
+        size_of::<[f32; 4]>() + layers.map(|aov| aov.bytes_per_pixel(lights)).sum::<usize>()
     }
 }
 

@@ -39,7 +39,7 @@ use crate::scene::View;
 use creeping::forget_creeping;
 use glam::DVec3;
 use rayon::prelude::*;
-use std::sync::atomic::{AtomicU8, Ordering::Relaxed};
+use std::sync::atomic::{AtomicU8, AtomicU64, Ordering::Relaxed};
 use std::time::{Duration, Instant};
 
 /// Infers frames from their neighbours. Holds what the work needs between two frames, so that none is allocated for
@@ -61,6 +61,9 @@ pub struct Cost {
 }
 
 impl Inference {
+    /// What it holds for each pixel.
+    pub const BYTES_PER_PIXEL: usize = size_of::<AtomicU64>() + size_of::<AtomicU8>();
+
     /// Makes `new`, the samples of `new_view`, from `old`, those of `old_view`. Positions are relative to `origin`.
     ///
     /// Every sample that is reused lies inside its pixel's square (the half-pixel guarantee), and no old hit is known

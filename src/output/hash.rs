@@ -3,7 +3,7 @@
 use std::fmt;
 
 /// The fingerprint: 32 hexadecimal digits.
-#[derive(Debug, Clone, PartialEq, Eq, Hash, serde::Serialize, serde::Deserialize)]
+#[derive(Debug, Clone, Default, PartialEq, Eq, Hash, serde::Serialize, serde::Deserialize)]
 pub struct SettingsHash(String);
 
 impl SettingsHash {

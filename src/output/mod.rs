@@ -14,6 +14,7 @@ mod peak;
 mod report;
 mod resume;
 mod review;
+mod runs;
 mod sink;
 mod thumbnails;
 mod write;
@@ -26,11 +27,12 @@ pub use memory::{MemorySink, NullSink};
 pub use naming::{NamePattern, number_in_name};
 pub use peak::peak_bytes;
 pub use report::{
-    FrameRecord, FrameReport, IgnoredFeature, KeyFrame, Plan, Report, ReportInput, RunSeconds, SceneSummary,
+    FrameRecord, FrameReport, IgnoredFeature, KeyFrame, Plan, Report, ReportInput, SceneSummary,
     SegmentRange, Settings, TotalSeconds, Totals,
 };
 pub use resume::FrameFile;
 pub use review::Review;
+pub use runs::{Run, RunSeconds, earlier_runs};
 pub use sink::ExrSink;
 pub use thumbnails::{Thumbnail, Thumbnails, WithThumbnails};
 pub use write::write_alone;

@@ -1,7 +1,10 @@
 //! `report.json`: what was asked, what was planned, what was done and what it cost.
 
+use super::SettingsHash;
+use super::runs::{Run, RunSeconds};
 use super::write::write_alone;
 use crate::frame::{FrameKind, FrameStats, PixelClass, RayCounts, StageSeconds};
+use crate::plan;
 use crate::scene::{Ignored, Rational};
 use crate::{Error, Result};
 use serde::{Deserialize, Serialize};
@@ -13,6 +16,8 @@ use std::path::Path;
 pub struct ReportInput {
     /// The input as the user named it.
     pub input: String,
+    /// Identifies everything that decides the pixels.
+    pub settings_hash: SettingsHash,
     /// What was asked for.
     pub settings: Settings,
     /// What the scene holds.
@@ -21,10 +26,8 @@ pub struct ReportInput {
     pub plan: Plan,
     /// All frames of the run, in order.
     pub frames: Vec<FrameRecord>,
-    /// Wall seconds that belong to no frame.
-    pub seconds: RunSeconds,
-    /// Most memory held, bytes: see [`super::peak_bytes`].
-    pub peak_bytes: u64,
+    /// The runs that made them, the one that reports last.
+    pub runs: Vec<Run>,
     /// What the user was warned of.
     pub warnings: Vec<String>,
 }
@@ -42,19 +45,6 @@ pub struct FrameRecord {
     pub skipped: bool,
 }
 
-/// Wall seconds of the run that belong to no frame.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct RunSeconds {
-    /// Reading the scene.
-    pub import: f64,
-    /// Building what rays are traced through.
-    pub accel: f64,
-    /// Choosing key frames.
-    pub plan: f64,
-    /// From start to end.
-    pub wall: f64,
-}
-
 /// The report, as it is written: `buzz-report/1`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Report {
@@ -62,6 +52,8 @@ pub struct Report {
     pub schema: String,
     /// The input as the user named it.
     pub input: String,
+    /// Identifies everything that decides the pixels: frames and reports of one hash belong together.
+    pub settings_hash: SettingsHash,
     /// What was asked for.
     pub settings: Settings,
     /// What the scene holds.
@@ -72,6 +64,8 @@ pub struct Report {
     pub totals: Totals,
     /// All frames, in order.
     pub frames: Vec<FrameReport>,
+    /// The runs that made them, the one that reports last.
+    pub runs: Vec<Run>,
     /// What the user was warned of.
     pub warnings: Vec<String>,
 }
@@ -149,6 +143,23 @@ pub struct Plan {
     pub cuts: Vec<i64>,
 }
 
+impl From<&plan::Plan> for Plan {
+    fn from(plan: &plan::Plan) -> Self {
+        let keyframes = plan.keyframes.iter();
+        Self {
+            keyframes: keyframes
+                .map(|k| KeyFrame { frame: k.frame, reason: k.reason.name().into() })
+                .collect(),
+            segments: plan
+                .segments
+                .iter()
+                .map(|&plan::Segment { key, first, last }| SegmentRange { key, first, last })
+                .collect(),
+            cuts: plan.cuts.clone(),
+        }
+    }
+}
+
 /// A frame traced in full, and why.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct KeyFrame {
@@ -169,7 +180,7 @@ pub struct SegmentRange {
     pub last: i64,
 }
 
-/// Sums over all frames.
+/// Sums over all frames, and over all runs.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Totals {
     /// Frames.
@@ -186,11 +197,11 @@ pub struct Totals {
     pub seconds: TotalSeconds,
     /// Reused samples that something hides from the eye; `None` without `--audit`.
     pub hidden: Option<u64>,
-    /// Most memory held, bytes.
+    /// Most memory that any run held, bytes.
     pub peak_bytes: u64,
 }
 
-/// Wall seconds of the whole run.
+/// Wall seconds of all runs, added up.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct TotalSeconds {
     /// Reading the scene.
@@ -224,7 +235,7 @@ pub struct FrameReport {
     pub pixels: Map<String, Value>,
     /// Rays cast.
     pub rays: RayCounts,
-    /// Wall seconds; 0 for skipped frames.
+    /// Wall seconds; those of a skipped frame stand in an earlier run's report, and are 0 if there is none.
     pub seconds: StageSeconds,
     /// Reused samples that something hides from the eye; `None` without `--audit`.
     pub hidden: Option<u64>,
@@ -242,11 +253,13 @@ impl Report {
         Self {
             schema: Self::SCHEMA.into(),
             input: input.input,
+            settings_hash: input.settings_hash,
             settings: input.settings,
             scene: input.scene,
             plan: input.plan,
             totals,
             frames: input.frames.iter().map(FrameReport::from).collect(),
+            runs: input.runs.into_iter().map(Run::rounded).collect(),
             warnings: input.warnings,
         }
     }
@@ -284,7 +297,8 @@ impl Totals {
                 *sum.hidden.get_or_insert(0) += hidden;
             }
         }
-        let RunSeconds { import, accel, plan, wall } = input.seconds.rounded();
+        let of_runs =
+            |part: fn(&RunSeconds) -> f64| microseconds(input.runs.iter().map(|r| part(&r.seconds)).sum());
         let StageSeconds { infer, trace, enhance, write } = rounded(sum.seconds);
         Self {
             frames: input.frames.len(),
@@ -292,9 +306,18 @@ impl Totals {
             inferred_frames: input.frames.len() - traced_frames,
             pixels: pixels_by_name(&sum.pixels),
             rays: sum.rays,
-            seconds: TotalSeconds { import, accel, plan, infer, trace, enhance, write, wall },
+            seconds: TotalSeconds {
+                import: of_runs(|s| s.import),
+                accel: of_runs(|s| s.accel),
+                plan: of_runs(|s| s.plan),
+                infer,
+                trace,
+                enhance,
+                write,
+                wall: of_runs(|s| s.wall),
+            },
             hidden: sum.hidden,
-            peak_bytes: input.peak_bytes,
+            peak_bytes: input.runs.iter().map(|r| r.peak_bytes).max().unwrap_or(0),
         }
     }
 }
@@ -318,17 +341,6 @@ impl From<&FrameRecord> for FrameReport {
     }
 }
 
-impl RunSeconds {
-    fn rounded(self) -> Self {
-        Self {
-            import: microseconds(self.import),
-            accel: microseconds(self.accel),
-            plan: microseconds(self.plan),
-            wall: microseconds(self.wall),
-        }
-    }
-}
-
 /// All classes by name, in the order of the contract: traced pixels last.
 fn pixels_by_name(pixels: &[u64; PixelClass::COUNT]) -> Map<String, Value> {
     let traced_last = PixelClass::ALL.iter().skip(1).chain(&PixelClass::ALL[..1]);
@@ -345,7 +357,7 @@ fn rounded(seconds: StageSeconds) -> StageSeconds {
 }
 
 /// Clocks tell no more, and seventeen digits are hard to read. What is not finite is 0: JSON has no word for it.
-fn microseconds(seconds: f64) -> f64 {
+pub(super) fn microseconds(seconds: f64) -> f64 {
     if seconds.is_finite() { (seconds * 1e6).round() / 1e6 } else { 0.0 }
 }
 
@@ -370,7 +382,10 @@ mod tests {
                 record(-1, FrameKind::Traced, stats(PixelClass::Traced, None)),
                 record(0, FrameKind::Inferred { from: -1 }, stats(PixelClass::Good, Some(3))),
             ],
-            seconds: RunSeconds { wall: f64::NAN, ..RunSeconds::default() },
+            runs: vec![Run {
+                seconds: RunSeconds { wall: f64::NAN, ..RunSeconds::default() },
+                ..Run::default()
+            }],
             ..ReportInput::default()
         })
     }

@@ -85,6 +85,7 @@ pub(super) fn explain(path: &Path, error: &io::Error) -> Error {
             ": choose a folder that may be written to"
         }
         io::ErrorKind::NotFound => ": see whether its folder is there",
+        io::ErrorKind::FileTooLarge => ": raise the limit on file sizes, then run again with --skip-existing",
         io::ErrorKind::NotADirectory => ": it must be a folder",
         io::ErrorKind::StaleNetworkFileHandle | io::ErrorKind::TimedOut => {
             ": see whether the folder is still connected, then run again with --skip-existing"

@@ -11,7 +11,7 @@ pub use motion::{PathFrame, ProbePoint, Step};
 
 use crate::frame::{FrameKind, Quality};
 use motion::find_cuts;
-use segments::{Chain, divide};
+use segments::{Chain, Range, divide};
 
 /// Longest segment where the user gives none. The cost model ends segments long before, unless the camera rests.
 pub const LONGEST_SEGMENT: u32 = 129;
@@ -26,13 +26,19 @@ pub enum Reason {
     /// Inference from the segment before would have cost more than tracing: the camera moves too fast, or something
     /// in the scene changed.
     Cost,
-    /// The segment before had its longest useful length: samples lose their place as they are carried on.
+    /// The segment before had its longest useful length: samples lose their place as they are carried on, or another
+    /// worker's share begins.
     Length,
     /// There is no other frame.
     Only,
 }
 
 impl Reason {
+    /// The reason of that [`Reason::name`].
+    pub fn named(name: &str) -> Option<Self> {
+        [Self::First, Self::Cut, Self::Cost, Self::Length, Self::Only].into_iter().find(|r| r.name() == name)
+    }
+
     /// The word in reports.
     pub fn name(self) -> &'static str {
         match self {
@@ -87,6 +93,17 @@ pub struct PlannedFrame {
     pub predicted_traced: f64,
 }
 
+/// What one of several workers renders: consecutive segments.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Share {
+    /// First frame.
+    pub first: i64,
+    /// Last frame, included.
+    pub last: i64,
+    /// Predicted cost in frames traced in full.
+    pub cost: f64,
+}
+
 /// The plan of a sequence.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Plan {
@@ -98,6 +115,8 @@ pub struct Plan {
     pub segments: Vec<Segment>,
     /// First frames after a cut.
     pub cuts: Vec<i64>,
+    /// The workers' shares, in order: at most as many as there are workers. A plan that is replayed has none.
+    pub shares: Vec<Share>,
 }
 
 /// What a plan may do.
@@ -107,6 +126,9 @@ pub struct PlanOptions {
     pub quality: Quality,
     /// Longest segment in frames, at least 1.
     pub longest_segment: u32,
+    /// How many machines render at the same time, at least 1: the plan is for the one that takes longest to be done as
+    /// soon as possible.
+    pub workers: usize,
 }
 
 /// Plans a sequence from its path (consecutive frames; at least one).
@@ -114,40 +136,119 @@ pub struct PlanOptions {
 /// `cuts` are frames from which on the scene says that another camera, or another shot, is seen. Jumps of the camera
 /// are found and added.
 pub fn plan(path: &[PathFrame], cuts: &[i64], options: PlanOptions) -> Plan {
-    let steps = motion::steps(path);
-    let all_cuts = find_cuts(path, &steps, cuts);
-    let mut plan = Plan { cuts: all_cuts, ..Plan::default() };
-    let mut first = 0;
-    while first < path.len() {
-        let end = (first + 1..path.len()).find(|&i| plan.cuts.contains(&path[i].frame)).unwrap_or(path.len());
-        let full = options.quality == Quality::Full;
-        let half = if full { 0 } else { options.longest_segment.saturating_sub(1) as usize };
-        let shot = &steps[first..end.max(first + 1) - 1];
-        let chains = Chain::of_shot(shot, half, options.quality.is_centred());
-        for range in divide(&chains, end - first) {
-            let segment = Segment {
-                key: path[first + range.key].frame,
-                first: path[first + range.first].frame,
-                last: path[first + range.last].frame,
-            };
-            let reason = match range.first {
-                _ if path.len() == 1 => Reason::Only,
-                0 if first == 0 => Reason::First,
-                0 => Reason::Cut,
-                i if full || steps[first + i - 1].is_dear() => Reason::Cost,
-                _ => Reason::Length,
-            };
-            plan.keyframes.push(KeyFrame { frame: segment.key, reason });
-            plan.segments.push(segment);
-            for i in range.first..=range.last {
-                let frame = path[first + i].frame;
-                let predicted_traced = chains[range.key].predicted(i as isize - range.key as isize);
-                plan.frames.push(PlannedFrame { frame, kind: segment.kind(frame), predicted_traced });
-            }
+    let full = options.quality == Quality::Full;
+    let survey = Survey::of(path, cuts, options.quality, if full { 1 } else { options.longest_segment });
+    let mut plan = Plan { cuts: survey.cuts.clone(), ..Plan::default() };
+    for segments::Share { ranges, cost } in divide(&survey.chains, options.workers) {
+        for &range in &ranges {
+            survey.add(&mut plan, range, survey.reason(range.first, full));
         }
-        first = end;
+        if let (Some(first), Some(last)) = (ranges.first(), ranges.last()) {
+            plan.shares.push(Share { first: path[first.first].frame, last: path[last.last].frame, cost });
+        }
     }
     plan
+}
+
+/// Makes a plan of `segments` and `cuts` that were chosen before, and predicts what they take; `named` are the cuts that
+/// the scene says.
+///
+/// # Errors
+/// What does not fit, in words: if the segments do not hold every frame of the path once and in order, or if something
+/// within one changes that nothing can be inferred across.
+pub fn replay(
+    path: &[PathFrame],
+    named: &[i64],
+    quality: Quality,
+    segments: &[(Segment, Reason)],
+    cuts: &[i64],
+) -> Result<Plan, String> {
+    let lengths = segments.iter().map(|(s, _)| s.last.saturating_sub(s.first));
+    // A chain reaches half as far as the longest segment, and a key frame may be at the end of its segment.
+    let longest = lengths.max().unwrap_or(0).saturating_mul(2).saturating_add(2);
+    let survey = Survey::of(path, cuts, quality, u32::try_from(longest).unwrap_or(u32::MAX));
+    let mut plan = Plan { cuts: cuts.to_vec(), ..Plan::default() };
+    for &(Segment { key, first, last }, reason) in segments {
+        let range = Range { key: survey.place(key), first: plan.frames.len(), last: survey.place(last) };
+        let fail = |what: String| Err(format!("segment {first}-{last} of key frame {key} {what}"));
+        let held = path.get(range.first..=range.last);
+        let Some(frames) = held.filter(|f| f.first().is_some_and(|f| f.frame == first)) else {
+            let next =
+                path.get(range.first).map_or_else(|| "the end".into(), |f| format!("frame {}", f.frame));
+            return fail(format!("must begin with {next}, which is next, and end within the sequence"));
+        };
+        if !(first..=last).contains(&key) {
+            return fail("does not hold it".into());
+        }
+        for PathFrame { frame, scene_changed, .. } in &frames[1..] {
+            if *scene_changed {
+                return fail(format!("goes on at frame {frame}, where more than the camera has moved"));
+            }
+            if cuts.contains(frame) || named.contains(frame) {
+                return fail(format!("goes on at frame {frame}, after a cut"));
+            }
+        }
+        survey.add(&mut plan, range, reason);
+    }
+    match path.get(plan.frames.len()) {
+        Some(missing) => Err(format!("no segment holds frame {}", missing.frame)),
+        None => Ok(plan),
+    }
+}
+
+/// What is known about a path before it is divided.
+struct Survey<'a> {
+    path: &'a [PathFrame],
+    steps: Vec<Step>,
+    /// Named and found.
+    cuts: Vec<i64>,
+    /// Of each frame as a key frame; none reaches across a cut.
+    chains: Vec<Chain>,
+}
+
+impl<'a> Survey<'a> {
+    fn of(path: &'a [PathFrame], cuts: &[i64], quality: Quality, longest_segment: u32) -> Self {
+        let steps = motion::steps(path);
+        let cuts = find_cuts(path, &steps, cuts);
+        let mut chains = Vec::with_capacity(path.len());
+        while chains.len() < path.len() {
+            let first = chains.len();
+            let end = (first + 1..path.len()).find(|&i| cuts.contains(&path[i].frame)).unwrap_or(path.len());
+            let (shot, others) = (&steps[first..end - 1], longest_segment.saturating_sub(1) as usize);
+            chains.extend(Chain::of_shot(shot, others, quality.is_centred()));
+        }
+        Self { path, steps, cuts, chains }
+    }
+
+    /// The place of a frame in the path, whose frames follow on one another; beyond it for frames that it has not.
+    fn place(&self, frame: i64) -> usize {
+        let first = self.path.first().map_or(0, |f| f.frame);
+        usize::try_from(frame.saturating_sub(first)).unwrap_or(self.path.len()).min(self.path.len())
+    }
+
+    /// Why a segment begins at place `first`.
+    fn reason(&self, first: usize, full: bool) -> Reason {
+        match first {
+            _ if self.path.len() == 1 => Reason::Only,
+            0 => Reason::First,
+            _ if self.cuts.contains(&self.path[first].frame) => Reason::Cut,
+            _ if full || self.steps[first - 1].is_dear() => Reason::Cost,
+            _ => Reason::Length,
+        }
+    }
+
+    fn add(&self, plan: &mut Plan, range: Range, reason: Reason) {
+        let number = |place: usize| self.path[place].frame;
+        let segment =
+            Segment { key: number(range.key), first: number(range.first), last: number(range.last) };
+        plan.keyframes.push(KeyFrame { frame: segment.key, reason });
+        plan.segments.push(segment);
+        for place in range.first..=range.last {
+            let predicted_traced = self.chains[range.key].predicted(place as isize - range.key as isize);
+            let frame = number(place);
+            plan.frames.push(PlannedFrame { frame, kind: segment.kind(frame), predicted_traced });
+        }
+    }
 }
 
 impl Plan {

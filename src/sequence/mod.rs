@@ -158,6 +158,9 @@ pub fn render_sequence(
     Ok(())
 }
 
+/// How many [`BuzzBuffer`]s [`render_sequence`] holds: the key frame's, the neighbour's and the frame's own.
+pub const RENDER_BUFFERS: usize = 3;
+
 /// What inference needs between frames; swapped, never made anew.
 #[derive(Default)]
 struct Buffers {

@@ -3,6 +3,7 @@
 #![allow(missing_docs, clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 mod determinism;
+mod farm;
 mod layers;
 mod motion;
 mod options;
@@ -12,6 +13,5 @@ mod resume;
 mod rig;
 mod soft;
 mod stage;
-mod stopping;
 mod trade;
 mod whole;

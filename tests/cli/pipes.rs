@@ -101,6 +101,8 @@ fn help_lists_every_option() {
         "--overwrite",
         "--report",
         "--progress",
+        "--plan",
+        "--memory",
         "--strict",
         "--geometry",
         "--camera-from",

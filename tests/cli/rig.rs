@@ -116,7 +116,8 @@ pub const SMALL: &str = "-r 96x54";
 pub fn reference() -> &'static Path {
     static FOLDER: OnceLock<PathBuf> = OnceLock::new();
     FOLDER.get_or_init(|| {
-        let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("cli-reference");
+        let folder =
+            Path::new(env!("CARGO_TARGET_TMPDIR")).join(concat!(env!("CARGO_CRATE_NAME"), "-reference"));
         let _ = fs::remove_dir_all(&folder);
         run(&courtyard(), &folder, &format!("{SMALL} -j 2")).ok();
         folder

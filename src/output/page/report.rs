@@ -54,7 +54,7 @@ impl Report {
                 format!("{} of {} ({})", grouped(reused), grouped(pixels), percent(reused, pixels)),
             ),
             ("Rays", ray_text(&totals.rays)),
-            ("Time", format!("{:.2} s; {}", totals.seconds.wall, self.stages())),
+            ("Time", format!("{:.2} s{}; {}", totals.seconds.wall, self.of_runs(), self.stages())),
             (
                 "Settings",
                 format!(
@@ -99,6 +99,14 @@ impl Report {
         let rows: String =
             rows.iter().map(|(name, value)| format!("<dt>{name}</dt><dd>{value}</dd>")).collect();
         format!("<dl>{rows}</dl>\n")
+    }
+
+    /// Whose time it is, where several runs made the frames.
+    fn of_runs(&self) -> String {
+        match self.runs.len() {
+            0 | 1 => String::new(),
+            runs => format!(", {runs} runs added up"),
+        }
     }
 
     /// Where the time went.

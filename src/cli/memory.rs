@@ -1,0 +1,46 @@
+//! `--memory`: what rendering will take, found out before it begins.
+
+use super::job::Job;
+use anyhow::Result;
+use buzz::error::Error;
+use buzz::infer::{BuzzBuffer, Inference};
+use buzz::output::{ExrSink, peak_bytes};
+use buzz::sequence::RENDER_BUFFERS;
+use buzz::trace::lit_words;
+
+/// Stacks, and what each thread encodes at a time.
+const BYTES_PER_THREAD: u64 = 2 << 20;
+
+/// An error if rendering is estimated to take more than `limit` bytes. To be asked once the scene is read and planned.
+pub fn refuse_over(limit: u64, job: &Job) -> Result<()> {
+    let held = peak_bytes();
+    if held == 0 {
+        let message = "--memory: this system does not say how much memory a process holds; leave it out";
+        return Err(Error::Usage(message.into()).into());
+    }
+    let estimate = held + rendering(job);
+    if estimate <= limit {
+        return Ok(());
+    }
+    let mebibytes = |bytes: u64| bytes.div_ceil(1 << 20);
+    let message = format!(
+        "--memory: rendering is estimated to take {} MiB ({} MiB of them for the scene), over the {} MiB allowed; allow more, or lower --resolution, --aov or --threads",
+        mebibytes(estimate),
+        mebibytes(held),
+        limit >> 20
+    );
+    Err(Error::Usage(message).into())
+}
+
+/// What rendering takes besides what is held once the scene has been read, its trees built, and every frame posed and
+/// probed by the planner: the buffers of inference, the frames under way, and those that are encoded.
+fn rendering(job: &Job) -> u64 {
+    let (settings, scene) = (&job.settings, &job.scene);
+    let lights = scene.lights.len();
+    let inference = RENDER_BUFFERS * BuzzBuffer::bytes_per_pixel(lit_words(scene, settings.trace_options()))
+        + Inference::BYTES_PER_PIXEL;
+    // One frame is filled while others are encoded; a file is at most as large as the layers that it is made of.
+    let frame = settings.aovs.bytes_per_pixel(lights);
+    let frames = (ExrSink::IN_FLIGHT + 1) * frame + ExrSink::IN_FLIGHT * frame;
+    (settings.window.pixels() * (inference + frames)) as u64 + job.threads as u64 * BYTES_PER_THREAD
+}
