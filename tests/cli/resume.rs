@@ -1,7 +1,7 @@
-//! Frames that are there already.
+//! Frames that are there already. (Damaged and foreign ones: `tests/faults.rs`.)
 
 use crate::rig::{Outcome, frames_in, fresh, json, run};
-use crate::stage::{CARD, Stage};
+use crate::stage::Stage;
 use std::fs::{self, File};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, SystemTime};
@@ -83,31 +83,4 @@ fn what_decides_pixels_makes_them_anew() {
         run(&scene, &out, &format!("{size} --skip-existing {other}")).ok();
         assert_eq!(kept(&out), 0, "{other}");
     }
-}
-
-#[test]
-fn a_changed_scene_makes_them_anew() {
-    let (_folder, scene, out) = rendered();
-    let mut changed = Stage::drifting(4);
-    changed.json["nodes"][CARD]["translation"] = serde_json::json!([0.1, 0, 0]);
-    changed.write(&scene);
-    again(&scene, &out, "--skip-existing").ok();
-    assert_eq!(kept(&out), 0);
-}
-
-#[test]
-fn damaged_and_foreign_files_are_replaced() {
-    let (folder, scene, out) = rendered();
-    let whole = folder.path().join("whole");
-    again(&scene, &whole, "").ok();
-    let bytes = fs::read(out.join("s.0000.exr")).unwrap();
-    fs::write(out.join("s.0000.exr"), &bytes[..bytes.len() / 2]).unwrap();
-    fs::write(out.join("s.0001.exr"), "a foreign file").unwrap();
-    let mut flipped = bytes;
-    let last = flipped.len() - 20;
-    flipped[last] ^= 4;
-    fs::write(out.join("s.0002.exr"), flipped).unwrap();
-    again(&scene, &out, "--skip-existing").ok();
-    assert_eq!(crate::rig::assert_same_bytes(&out, &whole), 4);
-    assert_eq!(kept(&out), 1);
 }
