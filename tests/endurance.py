@@ -11,6 +11,7 @@ anything is left over, or if memory grows. `test_endurance.py` does the same wit
 
 import argparse
 import json
+import os
 import random
 import shutil
 import struct
@@ -20,7 +21,7 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
 SCENE = ROOT / "scenes" / "buzz-city" / "buzz-city.gltf"
-BUZZ = ROOT / "target" / "release" / "buzz-convert"
+BUZZ = Path(os.environ.get("BUZZ_CONVERT", ROOT / "target" / "release" / "buzz-convert"))
 SIZES = {"SCALAR": 1, "VEC3": 3, "VEC4": 4}
 
 

@@ -1,7 +1,6 @@
 """`endurance.py` with few frames."""
 
 import json
-import os
 import random
 import subprocess
 from pathlib import Path
@@ -10,10 +9,7 @@ import endurance
 import pytest
 
 
-def test_a_render_that_is_killed_again_and_again_ends_with_the_same_frames(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(endurance, "BUZZ", Path(os.environ.get("BUZZ_CONVERT", endurance.BUZZ)))
+def test_a_render_that_is_killed_again_and_again_ends_with_the_same_frames(tmp_path: Path) -> None:
     scene = endurance.to_and_fro(700, tmp_path)
     calm, killed = tmp_path / "calm", tmp_path / "killed"
     endurance.finish(endurance.start(scene, calm, "32x24"))
