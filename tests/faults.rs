@@ -1,7 +1,7 @@
 //! What goes wrong around a run: disks, folders, signals, other runs, other files. After each fault nothing is lost, no
 //! file is partial, the exit code says what happened, and the next run brings the folder to the bytes of an undisturbed one.
 #![cfg(unix)]
-#![allow(missing_docs, clippy::unwrap_used, clippy::expect_used, clippy::panic)]
+#![allow(missing_docs, clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::print_stdout)]
 
 #[allow(dead_code)] // Shared with the other tests of the binary, which use the rest.
 #[path = "cli/rig.rs"]
