@@ -82,16 +82,22 @@ def finish(process: subprocess.Popen) -> list[int]:
 
 
 def torment(scene: Path, out: Path, resolution: str, seconds: tuple[float, float], moments: random.Random) -> int:
-    """Kills runs at random moments until one comes to its end; returns how many were killed."""
-    kills = 0
+    """Kills runs at random moments until one comes to its end; returns how many were killed.
+
+    A run first checks what is there, which takes the longer the more it is and the busier the machine: after one that got no
+    further, the next has twice the time.
+    """
+    kills, patience, done = 0, 1.0, 0
     while True:
         process = start(scene, out, resolution)
         try:
-            code = process.wait(moments.uniform(*seconds))
+            code = process.wait(patience * moments.uniform(*seconds))
         except subprocess.TimeoutExpired:
             process.kill()
             process.wait()
             kills += 1
+            before, done = done, len(list(out.glob("*.exr")))
+            patience = 1.0 if done > before else 2 * patience
             continue
         if code != 0:
             raise SystemExit(f"buzz-convert ended with {code}")

@@ -20,6 +20,7 @@ use buzz::plan::{Plan, Segment};
 use buzz::scene::Requirements;
 use buzz::sequence::{FrameSink, Observer, render_sequence};
 use buzz::trace::lit_words;
+use rayon::prelude::*;
 use std::collections::BTreeSet;
 use std::path::Path;
 use std::process::ExitCode;
@@ -214,22 +215,26 @@ fn existing(
     args: &ConvertArgs,
     interrupt: &Interrupt,
 ) -> Result<Vec<FrameRecord>> {
-    let mut kept = Vec::new();
-    for &number in frames {
-        // Each file is read in full: thousands of them take their time.
-        if let Some(signal) = interrupt.stop_requested() {
-            return Err(Error::Interrupted { signal }.into());
-        }
-        if args.output.skip_existing {
-            if let FrameFile::Complete(stats, kind) = folder.check(number, hash) {
-                kept.push(FrameRecord { number, kind, stats, skipped: true });
-            }
-        } else if !args.output.overwrite && folder.file_of(number).exists() {
-            let message = "is there already; give --skip-existing to keep finished frames, or --overwrite to replace them";
-            return Err(Error::output(folder.file_of(number), message).into());
-        }
+    if args.output.overwrite {
+        return Ok(Vec::new());
     }
-    Ok(kept)
+    if !args.output.skip_existing {
+        if let Some(path) = frames.iter().map(|&number| folder.file_of(number)).find(|path| path.exists()) {
+            let message = "is there already; give --skip-existing to keep finished frames, or --overwrite to replace them";
+            return Err(Error::output(path, message).into());
+        }
+        return Ok(Vec::new());
+    }
+    // Each file is read in full: thousands of them take their time.
+    let check = |&number: &i64| match interrupt.stop_requested() {
+        Some(signal) => Err(Error::Interrupted { signal }),
+        None => Ok(match folder.check(number, hash) {
+            FrameFile::Complete(stats, kind) => Some(FrameRecord { number, kind, stats, skipped: true }),
+            FrameFile::Missing | FrameFile::Stale(_) => None,
+        }),
+    };
+    let found = frames.par_iter().map(check).collect::<buzz::Result<Vec<_>>>()?;
+    Ok(found.into_iter().flatten().collect())
 }
 
 fn compression(compression: CompressionArg) -> Compression {
