@@ -37,8 +37,8 @@ pub fn refuse_over(limit: u64, job: &Job) -> Result<()> {
 fn rendering(job: &Job) -> u64 {
     let (settings, scene) = (&job.settings, &job.scene);
     let lights = scene.lights.len();
-    let inference = RENDER_BUFFERS * BuzzBuffer::bytes_per_pixel(lit_words(scene, settings.trace_options()))
-        + Inference::BYTES_PER_PIXEL;
+    let words = lit_words(scene, settings.trace_options());
+    let inference = RENDER_BUFFERS * BuzzBuffer::bytes_per_pixel(words) + Inference::bytes_per_pixel(words);
     // One frame is filled while others are encoded; a file is at most as large as the layers that it is made of.
     let frame = settings.aovs.bytes_per_pixel(lights);
     let frames = (ExrSink::IN_FLIGHT + 1) * frame + ExrSink::IN_FLIGHT * frame;

@@ -64,6 +64,12 @@ pub struct Centring {
 }
 
 impl Centring {
+    /// The most that it holds for each pixel with so many words of shadow bits: a source and the lights to ask, and, where
+    /// every pixel is at a shadow's edge, its number three times, the lights to ask and the bits then.
+    pub fn bytes_per_pixel(words: usize) -> usize {
+        (1 + words + 3 + 2 * words) * size_of::<u32>()
+    }
+
     /// Centres what can be centred without a ray. All other pixels are left unknown; their class says why.
     pub fn recentre(
         &mut self,

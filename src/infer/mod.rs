@@ -61,8 +61,10 @@ pub struct Cost {
 }
 
 impl Inference {
-    /// What it holds for each pixel.
-    pub const BYTES_PER_PIXEL: usize = size_of::<AtomicU64>() + size_of::<AtomicU8>();
+    /// The most that it holds for each pixel, where a pixel has so many words of shadow bits.
+    pub fn bytes_per_pixel(words: usize) -> usize {
+        size_of::<AtomicU64>() + size_of::<AtomicU8>() + Centring::bytes_per_pixel(words)
+    }
 
     /// Makes `new`, the samples of `new_view`, from `old`, those of `old_view`. Positions are relative to `origin`.
     ///

@@ -122,7 +122,7 @@ fn tasks_may_be_repeated_and_what_one_left_out_is_made_up_for() {
     let (_folder, out) = fresh();
     let template = plan(&courtyard(), &format!("{SMALL} --format openjd"));
     let (scene, folder) = (courtyard(), out.to_str().unwrap().to_owned());
-    let set = [("Input", scene.to_str().unwrap()), ("OutputDir", &folder), ("Frames", "0-45")];
+    let set = [("Input", scene.to_str().unwrap()), ("OutputDir", &folder), ("Frames", "0-70")];
     let first = chunks(&template)[0];
     let task = command(&template, 0, first, &set);
     buzz(&task).ok();
@@ -135,8 +135,8 @@ fn tasks_may_be_repeated_and_what_one_left_out_is_made_up_for() {
     assert!(traced(&before) > 0.0 && (traced(&after) - traced(&before)).abs() < 1e-3);
     assert_eq!(after["runs"].as_array().unwrap().len(), 2);
     buzz(command(&template, 1, "", &set)).ok();
-    assert_eq!(assert_same_bytes(&out, reference()), 46);
-    assert_eq!(json(&out.join("report.0-45.json"))["totals"]["frames"], 46);
+    assert_eq!(assert_same_bytes(&out, reference()), 71);
+    assert_eq!(json(&out.join("report.0-70.json"))["totals"]["frames"], 71);
 }
 
 #[test]
@@ -193,7 +193,7 @@ fn workers_share_the_frames_and_replay_one_plan() {
     let borders = shares.iter().map(|s| format!("{}-{}", s["first"], s["last"]));
     assert_eq!(chunks(&template), borders.collect::<Vec<_>>());
     let qualities = template["parameterDefinitions"][2]["allowedValues"].as_array().unwrap();
-    assert!(qualities.contains(&"half-pixel".into()) && !qualities.contains(&"full".into()));
+    assert!(qualities.contains(&"centred".into()) && !qualities.contains(&"full".into()));
 
     // One by one or at once, from the template's own copy of the plan or from a file of it.
     let (folder, out) = fresh();
