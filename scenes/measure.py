@@ -4,9 +4,9 @@
     cargo build --release
     python3 scenes/measure.py OUT [scene ...] [--rounds 3]
 
-Each round renders a scene with `-q full`, then with `-q half-pixel`, so that whatever else the machine does meets both
-alike; times are those of the round with the median ratio. CPU seconds say what was worked, whoever else had the
-processor. The pictures stay in OUT/<scene>/full and OUT/<scene>/half-pixel.
+Each round renders a scene with `-q full`, then inferred in each quality, so that whatever else the machine does meets
+all alike; times are those of the round with the median ratio. CPU seconds say what was worked, whoever else had the
+processor. The pictures stay in OUT/<scene>/<quality>.
 """
 
 import argparse
@@ -17,9 +17,9 @@ from pathlib import Path
 
 HERE = Path(__file__).resolve().parent
 SIZES = {"courtyard": "1280x720", "gallery": "1280x720", "buzz-city": "640x480"}
-QUALITIES = ("full", "half-pixel")
-HEADER = ["scene", "pixels", "frames", "traced in full", "rays saved", "all rays saved", "PSNR mean", "worst"]
-HEADER += ["wall s", "times as fast", "CPU s", "times less CPU"]
+INFERRED = ("half-pixel", "centred")
+HEADER = ["scene", "pixels", "quality", "frames", "traced in full", "rays saved", "all rays saved"]
+HEADER += ["PSNR mean", "worst", "wall s", "times as fast", "CPU s", "times less CPU"]
 
 
 def convert(binary: Path, scene: str, quality: str, out: Path) -> dict:
@@ -36,11 +36,10 @@ def convert(binary: Path, scene: str, quality: str, out: Path) -> dict:
     return totals
 
 
-def compare(binary: Path, out: Path) -> dict:
-    """The error of the inferred sequence against the traced one."""
-    folders = [out / quality for quality in reversed(QUALITIES)]
-    text = subprocess.run([binary, "compare", *folders, "--format", "json"], check=True, stdout=subprocess.PIPE).stdout
-    return json.loads(text)
+def compare(binary: Path, out: Path, quality: str) -> dict:
+    """The error of an inferred sequence against the traced one."""
+    command = [binary, "compare", out / quality, out / "full", "--format", "json"]
+    return json.loads(subprocess.run(command, check=True, stdout=subprocess.PIPE).stdout)
 
 
 def ratio(pair: tuple[dict, dict], clock: str) -> float:
@@ -53,14 +52,19 @@ def saved(pair: tuple[dict, dict], kinds: tuple[str, ...]) -> str:
     return f"{100 * (1 - inferred / full):.1f} %"
 
 
-def measure(binary: Path, scene: str, out: Path, rounds: int) -> list[str]:
-    """One row of the table."""
-    pairs = []
+def measure(binary: Path, scene: str, out: Path, rounds: int) -> list[list[str]]:
+    """The rows of a scene, one for each quality."""
+    made = []
     for _ in range(rounds):
-        pairs.append(tuple(convert(binary, scene, quality, out / quality) for quality in QUALITIES))
-    by_wall = sorted(pairs, key=lambda pair: ratio(pair, "wall"))[rounds // 2]
-    by_cpu = sorted(pairs, key=lambda pair: ratio(pair, "cpu"))[rounds // 2]
-    error = compare(binary, out)
+        made.append({quality: convert(binary, scene, quality, out / quality) for quality in ("full", *INFERRED)})
+    return [row(binary, scene, out, quality, [(r["full"], r[quality]) for r in made]) for quality in INFERRED]
+
+
+def row(binary: Path, scene: str, out: Path, quality: str, pairs: list[tuple[dict, dict]]) -> list[str]:
+    """One row of the table."""
+    by_wall = sorted(pairs, key=lambda pair: ratio(pair, "wall"))[len(pairs) // 2]
+    by_cpu = sorted(pairs, key=lambda pair: ratio(pair, "cpu"))[len(pairs) // 2]
+    error = compare(binary, out, quality)
     first = pairs[0]
 
     def seconds(pair: tuple[dict, dict], clock: str) -> str:
@@ -69,11 +73,12 @@ def measure(binary: Path, scene: str, out: Path, rounds: int) -> list[str]:
     return [
         scene,
         SIZES[scene],
+        quality,
         str(first[1]["frames"]),
         str(first[1]["traced_frames"]),
         saved(first, ("primary", "visibility", "shadow")),
         saved(first, tuple(first[0]["rays"])),
-        f"{error['mean']['psnr_db']:.1f} dB",
+        f"{error['inferred_mean']['psnr_db']:.1f} dB",
         f"{error['worst']['psnr_db']:.1f} dB",
         seconds(by_wall, "wall"),
         f"{ratio(by_wall, 'wall'):.2f}",
@@ -92,7 +97,8 @@ def main() -> None:
     args = parser.parse_args()
     print("| " + " | ".join(HEADER) + " |\n|" + "---|" * len(HEADER), flush=True)
     for scene in args.scenes:
-        print("| " + " | ".join(measure(args.binary, scene, args.out / scene, args.rounds)) + " |", flush=True)
+        for cells in measure(args.binary, scene, args.out / scene, args.rounds):
+            print("| " + " | ".join(cells) + " |", flush=True)
 
 
 if __name__ == "__main__":

@@ -29,7 +29,8 @@ const WHITE: [f32; 3] = [0.950_428_55, 1.0, 1.088_900_4];
 /// The mean of [`flip_map`]: 0 (identical) to 1. 0 for empty pictures.
 pub fn flip_mean(picture: &[[f32; 3]], reference: &[[f32; 3]], width: usize) -> f64 {
     let map = flip_map(picture, reference, width, PIXELS_PER_DEGREE);
-    map.iter().map(|&v| f64::from(v)).sum::<f64>() / map.len().max(1) as f64
+    // Adding 0 makes a negative zero, which no error comes out as, a positive one.
+    map.iter().map(|&v| f64::from(v)).sum::<f64>() / map.len().max(1) as f64 + 0.0
 }
 
 /// The visible difference at each pixel, 0 to 1, of two sRGB-encoded pictures of `width` columns; empty if they are, or

@@ -93,6 +93,11 @@ fn every_quality_of_the_command_line_is_measured_and_drawn() {
             assert!(summary["error"]["psnr_db"].is_null() && quality["worst"].as_array().unwrap().is_empty());
             continue;
         }
+        if summary["error"]["psnr_db"].is_null() {
+            // On a scene as simple as this one, some qualities make no error at all.
+            assert!(page.contains(&format!("{name}: no error")) && name != "half-pixel");
+            continue;
+        }
         // In the picture of cost and error, and in that of the chain.
         assert!(page.matches(&format!("<title>{name}: ")).count() >= 2, "{name} is not drawn");
         assert!(page.contains(&format!("Worst places: {name}")));
@@ -118,7 +123,7 @@ fn differences_are_drawn_on_request() {
     let (folder, out) = fresh();
     let scene = Stage::drifting(4).write(&folder.path().join("s.gltf"));
     let full = folder.path().join("full");
-    run(&scene, &out, "-r 32x18").ok();
+    run(&scene, &out, "-r 32x18 -q half-pixel").ok();
     run(&scene, &full, "-r 32x18 -q full").ok();
     let pictures = folder.path().join("pictures");
     let paths = [&out, &full, &pictures].map(|p| p.to_str().unwrap().to_string());
