@@ -43,7 +43,7 @@ class BuzzSettings(bpy.types.PropertyGroup):
     width: IntProperty(name="Width", default=1920, min=1, max=65536, subtype="PIXEL")
     height: IntProperty(name="Height", default=1080, min=1, max=65536, subtype="PIXEL")
     camera: PointerProperty(name="Camera", description="One camera for all; empty: the markers', else the scene's", type=bpy.types.Object, poll=_is_camera)
-    quality: EnumProperty(name="Quality", items=_QUALITIES, default="half-pixel")
+    quality: EnumProperty(name="Quality", items=_QUALITIES, default="centred")
     layers: StringProperty(name="Layers", description="Extra layers of the sequence (--aov)", default="depth,class")
     bake: IntProperty(name="Bake Size", description="Pixels of baked procedural textures; 0 does not bake", default=1024, min=0, max=16384)
     after: EnumProperty(name="Afterwards", items=_AFTER, default="NODES")
