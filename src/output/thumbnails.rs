@@ -54,7 +54,7 @@ struct Small {
 }
 
 impl Thumbnails {
-    /// For the run of `frames`: of all, or of [`MOST_FRAMES`] that are spread evenly.
+    /// For the run of `frames`: of all, or of 200 that are spread evenly.
     pub fn of(frames: &BTreeSet<i64>) -> Self {
         let step = frames.len().div_ceil(MOST_FRAMES).max(1);
         Self { chosen: frames.iter().copied().step_by(step).collect(), ..Self::default() }
@@ -95,7 +95,7 @@ impl Thumbnails {
         self.small.par_iter().filter_map(|(&number, small)| Some((number, draw(small)?))).collect()
     }
 
-    /// All pictures, encoded for a page. If they take more than [`MOST_BYTES`], every second frame is left out until they do
+    /// All pictures, encoded for a page. If they take more than 8 MiB, every second frame is left out until they do
     /// not.
     pub fn encoded(&self) -> Vec<Thumbnail> {
         let mut all: Vec<Thumbnail> = self
