@@ -1,7 +1,7 @@
 //! Infers a scene as one segment, however long, and shows frames of it as the paper's figures do.
 //!
 //! ```text
-//! chain SCENE.gltf OUT.png WIDTH KEY FRAME...     a row a frame: inferred from KEY step by step, traced, difference
+//! chain SCENE.gltf OUT.png WIDTH QUALITY KEY FRAME...     a row a frame: inferred from KEY step by step, traced, difference
 //! ```
 //!
 //! `buzz-convert` ends segments long before, where a new key frame costs less than what samples lose on the way. The
@@ -17,25 +17,30 @@ use buzz::measure::{Exposure, psnr};
 use buzz::output::MemorySink;
 use buzz::plan::{Plan, Segment};
 use buzz::scene::Scene;
-use buzz::sequence::{Settings, Unwatched, render_sequence};
+use buzz::sequence::{Quality, Settings, Unwatched, render_sequence};
 use std::collections::BTreeSet;
 use std::error::Error;
 use std::path::Path;
 
 fn main() -> Result<(), Box<dyn Error>> {
     let args: Vec<String> = std::env::args().skip(1).collect();
-    let [input, out, width, key, numbers @ ..] = args.as_slice() else {
-        return Err("usage: chain SCENE.gltf OUT.png WIDTH KEY FRAME...".into());
+    let [input, out, width, quality, key, numbers @ ..] = args.as_slice() else {
+        return Err("usage: chain SCENE.gltf OUT.png WIDTH half-pixel|centred|verified KEY FRAME...".into());
     };
     let frames = numbers.iter().map(|n| n.parse()).collect::<Result<BTreeSet<i64>, _>>()?;
     let key: i64 = key.parse()?;
+    let inferring = [Quality::HalfPixel, Quality::Centred, Quality::Verified];
+    let quality = inferring
+        .into_iter()
+        .find(|q| q.name() == quality)
+        .ok_or("QUALITY is half-pixel, centred or verified")?;
     let scene = import(Path::new(input), &ImportOptions::default())?;
     let last = frames.last().copied().unwrap_or(key).max(key);
     let first = frames.first().copied().unwrap_or(key).min(key);
 
-    let inferred = render(&scene, vec![Segment { key, first, last }], &frames)?;
+    let inferred = render(&scene, quality, vec![Segment { key, first, last }], &frames)?;
     let each = frames.iter().map(|&f| Segment { key: f, first: f, last: f }).collect();
-    let traced = render(&scene, each, &frames)?;
+    let traced = render(&scene, Quality::Full, each, &frames)?;
     let exposure = Exposure::of(traced.frames.iter().map(|f| f.color.as_slice()));
 
     let mut pictures = Vec::new();
@@ -65,9 +70,14 @@ fn main() -> Result<(), Box<dyn Error>> {
 }
 
 /// Renders `frames` by these segments.
-fn render(scene: &Scene, segments: Vec<Segment>, frames: &BTreeSet<i64>) -> buzz::Result<MemorySink> {
+fn render(
+    scene: &Scene,
+    quality: Quality,
+    segments: Vec<Segment>,
+    frames: &BTreeSet<i64>,
+) -> buzz::Result<MemorySink> {
     let (width, height) = scene.timing.resolution.unwrap_or((1280, 720));
-    let mut settings = Settings::new(width, height);
+    let mut settings = Settings { quality, ..Settings::new(width, height) };
     settings.aovs = [Aov::Class].into_iter().collect();
     let plan = Plan { segments, ..Plan::default() };
     let mut sink = MemorySink::default();
