@@ -6,8 +6,21 @@ use super::triangle::{ShearedRay, TreeTriangle, TriangleHit};
 use super::wide::{Pending, SlabRay};
 use super::{Accel, Placed};
 use crate::frame::SurfaceRef;
-use crate::scene::{Mesh, Scene};
+use crate::scene::{Mesh, Scene, View};
 use glam::Vec3;
+
+/// A ray in render space, relative to [`Accel::origin`], and the part of it that counts.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Ray {
+    /// Where its parameter is 0.
+    pub origin: Vec3,
+    /// Of any length; the ray's parameter is measured in it.
+    pub direction: Vec3,
+    /// Nothing nearer is met.
+    pub t_min: f32,
+    /// Nothing farther is met.
+    pub t_max: f32,
+}
 
 /// What a ray meets: the little that is needed to go on.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -37,19 +50,22 @@ struct Nearest {
 }
 
 impl Accel {
-    /// The nearest surface with `t_min <= t <= t_max`. Holes cut by alpha are not met. Where two surfaces are
-    /// equally near, the one with the lower numbers is met, whatever the trees look like.
-    ///
-    /// `origin` is relative to [`Accel::origin`]; `direction` may have any length.
-    pub fn intersect(
-        &self,
-        scene: &Scene,
-        origin: Vec3,
-        direction: Vec3,
-        t_min: f32,
-        t_max: f32,
-        sides: Sides,
-    ) -> Option<RayHit> {
+    /// The ray of `view` through raster position (x, y), from its near plane to its far plane; its parameter is planar
+    /// depth.
+    pub fn camera_ray(&self, view: &View, x: f64, y: f64) -> Ray {
+        let ray = view.ray(x, y);
+        Ray {
+            origin: (ray.origin - self.origin).as_vec3(),
+            direction: ray.direction.as_vec3(),
+            t_min: view.lens.near.max(0.0) as f32,
+            t_max: view.lens.far as f32,
+        }
+    }
+
+    /// The nearest surface on the ray. Holes cut by alpha are not met. Where two surfaces are equally near, the one with
+    /// the lower numbers is met, whatever the trees look like.
+    pub fn intersect(&self, scene: &Scene, ray: &Ray, sides: Sides) -> Option<RayHit> {
+        let &Ray { origin, direction, t_min, t_max } = ray;
         let hit = TriangleHit { t: t_max, u: 0.0, v: 0.0, front: true };
         let mut nearest = Nearest { hit, instance: SurfaceRef::NONE, primitive: 0 };
         let start = self.bounds.approach(origin, direction);
@@ -73,17 +89,9 @@ impl Accel {
         })
     }
 
-    /// Where a ray meets one known triangle, if it does with `t_min <= t <= t_max`, holes cut by alpha considered: its
-    /// parameter and the point. Which side it meets does not matter; nothing else is looked at.
-    pub fn meet(
-        &self,
-        scene: &Scene,
-        origin: Vec3,
-        direction: Vec3,
-        t_min: f32,
-        t_max: f32,
-        surface: SurfaceRef,
-    ) -> Option<(f32, SurfaceRef)> {
+    /// Where a ray meets one known triangle, if it does, holes cut by alpha considered: its parameter and the point. Which
+    /// side it meets does not matter; nothing else is looked at.
+    pub fn meet(&self, scene: &Scene, ray: &Ray, surface: SurfaceRef) -> Option<(f32, SurfaceRef)> {
         let index = surface.instance as usize;
         let mesh = &scene.meshes[scene.instances[index].mesh];
         let positions = self.positions(index, mesh);
@@ -91,7 +99,7 @@ impl Accel {
         let corners = mesh.triangles[surface.primitive as usize]
             .map(|i| Vec3::from(m.transform_point3a(positions[i as usize].into())));
         let triangle = TreeTriangle::new(corners, surface.primitive, 0, 0);
-        let hit = ShearedRay::new(origin, direction).intersect(&triangle, t_min, t_max)?;
+        let hit = ShearedRay::new(ray.origin, ray.direction).intersect(&triangle, ray.t_min, ray.t_max)?;
         let flags = opacity::flags(scene, mesh);
         let present =
             flags & EYE_TEST == 0 || opacity::is_present_at(scene, mesh, surface.primitive, hit.u, hit.v);

@@ -24,7 +24,7 @@ use deform::{Deformed, Shape, affine, is_deformable};
 pub use displaced::Displaced;
 use fused::Fused;
 use glam::{Affine3A, DAffine3, DVec3, Mat3A, Vec3, Vec3A, Vec4};
-pub use intersect::{RayHit, Sides};
+pub use intersect::{Ray, RayHit, Sides};
 use rayon::prelude::*;
 use std::collections::HashMap;
 use tree::{Bounds, Part, Tree, build};

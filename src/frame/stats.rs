@@ -1,5 +1,6 @@
 //! What a frame cost, counted.
 
+use std::iter::Sum;
 use std::ops::AddAssign;
 
 /// Rays cast, by kind.
@@ -39,6 +40,15 @@ impl AddAssign for RayCounts {
         self.reflection += other.reflection;
         self.refraction += other.refraction;
         self.visibility += other.visibility;
+    }
+}
+
+impl Sum for RayCounts {
+    fn sum<I: Iterator<Item = Self>>(all: I) -> Self {
+        all.fold(Self::default(), |mut sum, counts| {
+            sum += counts;
+            sum
+        })
     }
 }
 

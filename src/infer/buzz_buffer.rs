@@ -122,10 +122,7 @@ impl BuzzBuffer {
             }
             counts
         };
-        self.rows_mut().enumerate().map(|(y, row)| cast_row(y, row)).reduce(RayCounts::default, |mut a, b| {
-            a += b;
-            a
-        })
+        self.rows_mut().enumerate().map(|(y, row)| cast_row(y, row)).sum()
     }
 
     /// The rows, for writing in parallel.
@@ -155,6 +152,15 @@ impl BuzzBuffer {
                 lit_words,
             })
     }
+}
+
+/// The pixels around one that are inside the image, at most eight.
+pub(super) fn pixels_around(width: usize, height: usize, pixel: usize) -> impl Iterator<Item = usize> {
+    let (x, y) = (pixel % width, pixel / width);
+    let columns = x.saturating_sub(1)..=(x + 1).min(width - 1);
+    let rows = y.saturating_sub(1)..=(y + 1).min(height - 1);
+    let block = rows.flat_map(move |y| columns.clone().map(move |x| y * width + x));
+    block.filter(move |&other| other != pixel)
 }
 
 /// One row of a [`BuzzBuffer`].

@@ -177,12 +177,7 @@ impl Centring {
             counts
         };
         let rows = new.rows_mut().zip(self.ask.par_chunks_mut((width * words).max(1)));
-        let counts = rows.enumerate().map(|(y, (row, ask))| cast_row(y, row, ask));
-        let mut counts = counts.reduce(RayCounts::default, |mut a, b| {
-            a += b;
-            a
-        });
-        counts += self.shadow_edges.follow(new, view, &mut self.ask, rays);
-        counts
+        let counts: RayCounts = rows.enumerate().map(|(y, (row, ask))| cast_row(y, row, ask)).sum();
+        [counts, self.shadow_edges.follow(new, view, &mut self.ask, rays)].into_iter().sum()
     }
 }

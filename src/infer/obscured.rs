@@ -10,7 +10,7 @@
 //! surface, the lines of its rim bound the hidden volume already.
 
 use super::Marks;
-use super::buzz_buffer::{BuzzBuffer, Projector};
+use super::buzz_buffer::{BuzzBuffer, Projector, pixels_around};
 use super::project::Landings;
 use crate::frame::PixelClass;
 use glam::{Vec2, Vec4};
@@ -28,8 +28,8 @@ pub fn obscured(
     landings: &Landings,
     marks: &Marks,
 ) {
-    let width = old.width();
-    (0..old.height()).into_par_iter().with_min_len(8).for_each(|y| {
+    let (width, height) = (old.width(), old.height());
+    (0..height).into_par_iter().with_min_len(8).for_each(|y| {
         for x in 0..width {
             let i = y * width + x;
             if old.surface[i].is_background() || !hides_something(old, x, y) {
@@ -40,26 +40,19 @@ pub fn obscured(
             if let Some(line) = Line::new(new_view, position.extend(1.0), direction.extend(0.0)) {
                 let begin = new_view.project_unclipped(position);
                 line.walk(new_view, |pixel, int_z| {
-                    if Some(pixel) != begin
-                        && landings
-                            .z(pixel)
-                            .or_else(|| around(landings, pixel, width))
-                            .is_none_or(|z| z > int_z)
-                    {
+                    // Where nothing landed, what landed around it shows how far away things are.
+                    let around = || {
+                        let around = pixels_around(width, height, pixel);
+                        around.filter_map(|other| landings.z(other)).reduce(f32::max)
+                    };
+                    let z = landings.z(pixel).or_else(around);
+                    if Some(pixel) != begin && z.is_none_or(|z| z > int_z) {
                         marks.set(pixel, PixelClass::Bad);
                     }
                 });
             }
         }
     });
-}
-
-/// The greatest depth that landed on one of the eight neighbours of a pixel.
-fn around(landings: &Landings, pixel: usize, width: usize) -> Option<f32> {
-    let pixels = landings.pixels();
-    let rows = [pixel.wrapping_sub(width), pixel, pixel + width];
-    let all = rows.into_iter().flat_map(|p| [p.wrapping_sub(1), p, p + 1]);
-    all.filter(|&p| p < pixels).filter_map(|p| landings.z(p)).reduce(f32::max)
 }
 
 /// True where one of the eight neighbours lies behind the sample, or is not known because the image ends.

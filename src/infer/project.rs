@@ -22,11 +22,6 @@ impl Landings {
         self.0.par_iter_mut().with_min_len(1 << 14).for_each(|l| *l.get_mut() = EMPTY);
     }
 
-    /// Number of pixels.
-    pub fn pixels(&self) -> usize {
-        self.0.len()
-    }
-
     /// Depth of what landed on the pixel; none where nothing did.
     pub fn z(&self, pixel: usize) -> Option<f32> {
         let landing = self.0[pixel].load(Relaxed);

@@ -6,7 +6,7 @@
 //! looked at again, until the edge has been followed to its end.
 
 use super::around::is_one_surface;
-use super::buzz_buffer::{BuzzBuffer, Projector};
+use super::buzz_buffer::{BuzzBuffer, Projector, pixels_around};
 use super::centre::CastCentres;
 use crate::frame::RayCounts;
 use rayon::prelude::*;
@@ -14,7 +14,7 @@ use rayon::prelude::*;
 /// What following holds between frames, so that nothing is allocated for each.
 #[derive(Debug, Default)]
 pub(super) struct ShadowEdges {
-    /// For each row: pixels at which neighbours disagree.
+    /// For each row: pixels that differ from one around them and have not asked everything.
     rows: Vec<Vec<u32>>,
     /// Pixels to look at, in order; those to look at next.
     pixels: Vec<u32>,
@@ -42,8 +42,11 @@ impl ShadowEdges {
         self.rows.resize_with(buffer.height(), Vec::new);
         self.rows.par_iter_mut().with_min_len(8).enumerate().for_each(|(y, row)| {
             row.clear();
-            let pixels = y * width..(y + 1) * width;
-            row.extend(pixels.filter(|&pixel| differs_around(buffer, pixel, y)).map(|pixel| pixel as u32));
+            let wonders = |pixel: &usize| {
+                let asked = &asked[pixel * words..][..words];
+                asked.iter().any(|&bits| bits != u32::MAX) && differs_around(buffer, *pixel)
+            };
+            row.extend((y * width..(y + 1) * width).filter(wonders).map(|pixel| pixel as u32));
         });
         self.pixels.clear();
         self.rows.iter().for_each(|row| self.pixels.extend(row));
@@ -66,13 +69,13 @@ impl ShadowEdges {
         self.ask.clear();
         self.ask.resize(self.pixels.len() * words, 0);
         self.lit.resize(self.pixels.len() * words, 0);
-        let ask_one = |((&pixel, ask), lit): ((&u32, &mut [u32]), &mut [u32])| {
+        let ask_one = |(&pixel, (ask, lit)): (&u32, (&mut [u32], &mut [u32]))| {
             let i = pixel as usize;
             lit.copy_from_slice(buffer.lit(i));
             let sample = buffer.sample(i);
-            for k in around(buffer, pixel).filter(|&k| buffer.lit(i) != buffer.lit(k)) {
-                if is_one_surface(&sample, &buffer.sample(k), view) {
-                    rays.differ(lit, buffer.lit(k), ask);
+            for other in pixels_around(buffer.width(), buffer.height(), i) {
+                if buffer.lit(other) != lit && is_one_surface(&sample, &buffer.sample(other), view) {
+                    rays.differ(lit, buffer.lit(other), ask);
                 }
             }
             ask.iter_mut().zip(&asked[i * words..]).for_each(|(ask, asked)| *ask &= !asked);
@@ -80,12 +83,8 @@ impl ShadowEdges {
             rays.recast(&sample, ask, lit, &mut counts);
             counts
         };
-        let all =
-            self.pixels.par_iter().zip(self.ask.par_chunks_mut(words)).zip(self.lit.par_chunks_mut(words));
-        all.with_min_len(64).map(ask_one).reduce(RayCounts::default, |mut a, b| {
-            a += b;
-            a
-        })
+        let answers = self.ask.par_chunks_mut(words).zip(self.lit.par_chunks_mut(words));
+        self.pixels.par_iter().zip(answers).with_min_len(64).map(ask_one).sum()
     }
 
     /// Takes over the answers; where they change a bit, the pixels around are looked at next.
@@ -99,7 +98,7 @@ impl ShadowEdges {
             if buffer.lit(i) != lit {
                 buffer.lit[i * words..][..words].copy_from_slice(lit);
                 self.next.push(pixel);
-                self.next.extend(around(buffer, pixel).map(|k| k as u32));
+                self.next.extend(pixels_around(buffer.width(), buffer.height(), i).map(|other| other as u32));
             }
         }
         self.next.sort_unstable();
@@ -108,27 +107,17 @@ impl ShadowEdges {
     }
 }
 
-/// True where the shadow bits of pixel `i`, in row `y`, may differ from those of a pixel around it.
-fn differs_around(buffer: &BuzzBuffer, i: usize, y: usize) -> bool {
-    let (width, words) = (buffer.width(), buffer.lit_words());
-    if y == 0 || y + 1 == buffer.height() || words > 1 || i == y * width || i + 1 == (y + 1) * width {
-        return true;
+/// True where the shadow bits of a pixel differ from those of one around it.
+fn differs_around(buffer: &BuzzBuffer, pixel: usize) -> bool {
+    let (width, height, words) = (buffer.width(), buffer.height(), buffer.lit_words());
+    let (x, y, own) = (pixel % width, pixel / width, buffer.lit(pixel));
+    if x == 0 || y == 0 || x + 1 == width || y + 1 == height {
+        return pixels_around(width, height, pixel).any(|other| buffer.lit(other) != own);
     }
-    let row = |i: usize| {
-        let lit = &buffer.lit[i - 1..=i + 1];
-        [lit[0], lit[1], lit[2]]
+    // Nearly every pixel ends here, so three to a row.
+    let differs = |middle: usize| {
+        let three = &buffer.lit[(middle - 1) * words..(middle + 2) * words];
+        three.chunks_exact(words).any(|bits| bits != own)
     };
-    let own = buffer.lit[i];
-    let differ =
-        [row(i - width), row(i), row(i + width)].as_flattened().iter().fold(0, |d, bits| d | (bits ^ own));
-    differ != 0
-}
-
-/// The pixels around one, inside the image.
-fn around(buffer: &BuzzBuffer, pixel: u32) -> impl Iterator<Item = usize> + use<> {
-    let (width, height) = (buffer.width(), buffer.height());
-    let (x, y) = (pixel as usize % width, pixel as usize / width);
-    let columns = x.saturating_sub(1)..=(x + 1).min(width - 1);
-    let rows = y.saturating_sub(1)..=(y + 1).min(height - 1);
-    rows.flat_map(move |y| columns.clone().map(move |x| y * width + x)).filter(move |&k| k != pixel as usize)
+    [pixel - width, pixel, pixel + width].into_iter().any(differs)
 }

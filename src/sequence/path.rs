@@ -40,9 +40,7 @@ fn probe(scene: &Scene, accel: &Accel, view: &View) -> Vec<ProbePoint> {
     let positions: Vec<(f64, f64)> = PathFrame::probe_positions(view).collect();
     let cast = |&(x, y): &(f64, f64)| {
         let ray = view.ray(x, y);
-        let origin = (ray.origin - accel.origin()).as_vec3();
-        let (near, far) = (view.lens.near as f32, view.lens.far as f32);
-        let hit = accel.intersect(scene, origin, ray.direction.as_vec3(), near, far, Sides::Visible);
+        let hit = accel.intersect(scene, &accel.camera_ray(view, x, y), Sides::Visible);
         match hit.map(|h| f64::from(h.t)) {
             Some(z) => ProbePoint { position: ray.origin + ray.direction * z, z },
             None => ProbePoint { position: ray.direction, z: f64::INFINITY },

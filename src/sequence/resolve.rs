@@ -134,13 +134,7 @@ impl Resolver<'_> {
             counts
         };
         let rows: Vec<Row<'_>> = rows(frame, width);
-        rows.into_par_iter().enumerate().map(|(y, row)| shade_row(y, row)).reduce(
-            RayCounts::default,
-            |mut a, b| {
-                a += b;
-                a
-            },
-        )
+        rows.into_par_iter().enumerate().map(|(y, row)| shade_row(y, row)).sum()
     }
 
     fn pixel(&self, sample: &SurfaceSample, lit: &[u32], counts: &mut RayCounts) -> Pixel {

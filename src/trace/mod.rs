@@ -19,7 +19,7 @@ mod visibility;
 mod whitted;
 mod world;
 
-use crate::accel::{Accel, Sides};
+use crate::accel::{Accel, Ray, Sides};
 use crate::frame::{PackedNormal, RayCounts, SurfaceSample};
 use crate::scene::{Pose, Scene, View};
 use glam::Vec3;
@@ -80,14 +80,6 @@ pub struct Tracer<'a> {
     lights: Vec<Emitter>,
     layout: Layout,
     world: Surroundings<'a>,
-}
-
-/// A camera ray in render space, and the part of it that the view shows.
-struct Ray {
-    origin: Vec3,
-    direction: Vec3,
-    near: f32,
-    far: f32,
 }
 
 /// The eye of a view in render space.
@@ -168,21 +160,19 @@ impl<'a> Tracer<'a> {
         y: f64,
         candidates: impl Iterator<Item = SurfaceSample>,
     ) -> Option<SurfaceSample> {
-        let ray = self.ray(view, x, y);
-        let mut nearest: Option<(f32, SurfaceSample)> = None;
+        let mut ray = self.accel.camera_ray(view, x, y);
+        let mut nearest = None;
         for candidate in candidates {
             if candidate.surface.is_background() {
                 return Some(SurfaceSample::background(ray.direction.normalize_or(Vec3::NEG_Z)));
             }
-            let t_max = nearest.map_or(ray.far, |n| n.0);
-            let hit =
-                self.accel.meet(self.scene, ray.origin, ray.direction, ray.near, t_max, candidate.surface);
-            if let Some((t, surface)) = hit {
+            if let Some((t, surface)) = self.accel.meet(self.scene, &ray, candidate.surface) {
+                ray.t_max = t;
                 let position = self.accel.surface_point(self.scene, surface);
-                nearest = Some((t, SurfaceSample { position, surface, ..candidate }));
+                nearest = Some(SurfaceSample { position, surface, ..candidate });
             }
         }
-        nearest.map(|n| n.1)
+        nearest
     }
 
     /// The first thing on the ray through raster position (x, y): a surface's sample and the point it lies on, or the
@@ -195,9 +185,9 @@ impl<'a> Tracer<'a> {
         rays: &mut RayCounts,
     ) -> (SurfaceSample, Option<SurfacePoint<'a>>) {
         rays.primary += 1;
-        let Ray { origin, direction, near, far } = self.ray(view, x, y);
-        let Some(hit) = self.accel.intersect(self.scene, origin, direction, near, far, Sides::Visible) else {
-            return (SurfaceSample::background(direction.normalize_or(Vec3::NEG_Z)), None);
+        let ray = self.accel.camera_ray(view, x, y);
+        let Some(hit) = self.accel.intersect(self.scene, &ray, Sides::Visible) else {
+            return (SurfaceSample::background(ray.direction.normalize_or(Vec3::NEG_Z)), None);
         };
         let point = SurfacePoint::new(self.scene, self.accel, hit.surface, Side::Front(hit.front));
         let sample = SurfaceSample {
@@ -207,16 +197,6 @@ impl<'a> Tracer<'a> {
             normal: PackedNormal::new(point.geometric),
         };
         (sample, Some(point))
-    }
-
-    fn ray(&self, view: &View, x: f64, y: f64) -> Ray {
-        let ray = view.ray(x, y);
-        Ray {
-            origin: (ray.origin - self.accel.origin()).as_vec3(),
-            direction: ray.direction.as_vec3(),
-            near: view.lens.near.max(0.0) as f32,
-            far: view.lens.far as f32,
-        }
     }
 
     /// Casts rays to each light that is `asked` for and could shine on the point, and to the world.
@@ -304,7 +284,7 @@ impl<'a> Tracer<'a> {
     pub fn is_hidden(&self, view: &View, sample: &SurfaceSample) -> bool {
         let eye = self.eye(view);
         let (near, far) = (view.lens.near.max(0.0) as f32, view.lens.far as f32);
-        let (origin, along, until) = match (eye.perspective, sample.surface.is_background()) {
+        let (origin, direction, until) = match (eye.perspective, sample.surface.is_background()) {
             (true, true) => (eye.position, sample.position, f32::INFINITY),
             (true, false) => (eye.position, sample.position - eye.position, 1.0 - HIDING_SHARE),
             (false, true) => return false,
@@ -313,11 +293,11 @@ impl<'a> Tracer<'a> {
                 (sample.position - eye.forward * depth, eye.forward * depth, 1.0 - HIDING_SHARE)
             }
         };
-        // Planar depth to a length of `along`.
-        let planar = along.dot(eye.forward);
+        // Planar depth to a length of `direction`.
+        let planar = direction.dot(eye.forward);
         let (t_min, t_max) = (near / planar, (far / planar).min(until));
-        planar > 0.0
-            && self.accel.intersect(self.scene, origin, along, t_min, t_max, Sides::Visible).is_some()
+        let ray = Ray { origin, direction, t_min, t_max };
+        planar > 0.0 && self.accel.intersect(self.scene, &ray, Sides::Visible).is_some()
     }
 
     fn eye(&self, view: &View) -> Eye {

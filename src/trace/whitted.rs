@@ -6,7 +6,7 @@ use super::light::{Emitter, GRID, Unshadowed};
 use super::point::Side;
 use super::surface::Surface;
 use super::{Radiance, Tracer};
-use crate::accel::Sides;
+use crate::accel::{Ray, Sides};
 use crate::frame::RayCounts;
 use glam::Vec3;
 use std::f32::consts::{FRAC_1_PI, TAU};
@@ -234,9 +234,8 @@ impl Tracer<'_> {
     /// What comes along a secondary ray.
     fn trace(&self, origin: Vec3, direction: Vec3, mut path: Path, rays: &mut RayCounts) -> Vec3 {
         path.count(rays);
-        let Some(hit) =
-            self.accel.intersect(self.scene, origin, direction, 0.0, f32::INFINITY, Sides::Visible)
-        else {
+        let ray = Ray { origin, direction, t_min: 0.0, t_max: f32::INFINITY };
+        let Some(hit) = self.accel.intersect(self.scene, &ray, Sides::Visible) else {
             return self.world.radiance(direction, path.beam.spread);
         };
         path.beam = path.beam.after(hit.t);

@@ -1,7 +1,7 @@
 //! What centring promises: samples at pixel centres, edges and shadows where a full trace has them.
 
-use crate::rig::{Eye, chain, four_spheres, is_hidden, small_step, spheres};
-use buzz::frame::{PixelClass, RayCounts};
+use crate::rig::{Eye, chain, four_spheres, is_hidden, off_centre, reused, small_step, spheres};
+use buzz::frame::RayCounts;
 use buzz::infer::{BuzzBuffer, CastRays, Trust, UNKNOWN};
 use buzz::scene::View;
 use glam::{DVec3, Vec3};
@@ -28,14 +28,10 @@ proptest! {
     #[test]
     fn samples_lie_at_centres(scene in spheres(), step in small_step(), turn in -0.02..0.02f64) {
         chain(&scene, Some(Trust::Neighbours), step, turn, 8, |view, buffer, _| {
-            let raster = view.raster_from_world(DVec3::ZERO);
             for i in 0..buffer.class.len() {
-                let s = buffer.sample(i);
-                prop_assert_ne!(s.object, UNKNOWN);
-                let w = if s.surface.is_background() { 0.0 } else { 1.0 };
-                let r = raster * s.position.as_dvec3().extend(w);
-                let (dx, dy) = (r.x / r.w - (i % 48) as f64 - 0.5, r.y / r.w - (i / 48) as f64 - 0.5);
-                prop_assert!(dx.abs().max(dy.abs()) <= 1.0 / 256.0 + 1e-3, "{} {}", dx, dy);
+                prop_assert_ne!(buffer.object[i], UNKNOWN);
+                let off = off_centre(view, buffer, i);
+                prop_assert!(off <= 1.0 / 256.0 + 1e-3, "{}", off);
             }
             Ok(())
         })?;
@@ -46,11 +42,7 @@ proptest! {
     fn counts_add_up(scene in spheres(), step in small_step(), turn in -0.02..0.02f64) {
         for trust in TRUSTS {
             chain(&scene, Some(trust), step, turn, 4, |_, buffer, rays| {
-                let counts = buffer.count_classes();
-                let reused: u64 =
-                    PixelClass::ALL.iter().filter(|c| c.is_reused()).map(|&c| counts[c as usize]).sum();
-                prop_assert_eq!(counts.iter().sum::<u64>(), 48 * 32);
-                prop_assert_eq!(counts[PixelClass::Traced as usize], 0);
+                let reused = reused(buffer)?;
                 prop_assert_eq!(48 * 32 - reused, rays.primary);
                 let proven = rays.visibility >= reused;
                 prop_assert!(if trust == Trust::Proof { proven } else { rays.visibility == 0 }, "{:?}", rays);

@@ -1,6 +1,6 @@
 //! Scenes of spheres over a ground plane, under one light, whose answers a closed form knows.
 
-use buzz::frame::{PackedNormal, RayCounts, SurfaceRef, SurfaceSample};
+use buzz::frame::{PackedNormal, PixelClass, RayCounts, SurfaceRef, SurfaceSample};
 use buzz::infer::{BuzzBuffer, CastCentres, CastRays, Inference, Projector, Trust};
 use buzz::scene::{Lens, Projection, View};
 use glam::{DMat3, DVec2, DVec3};
@@ -150,6 +150,23 @@ pub fn is_hidden(scene: &Spheres, view: &View, sample: &SurfaceSample) -> bool {
     let seen = scene.trace(view.eye, to);
     let distance = (seen.position.as_dvec3() - view.eye).length();
     !seen.surface.is_background() && distance < to.length() * (1.0 - 1e-3)
+}
+
+/// How far from its pixel's centre the sample of pixel `i` lies, in pixels: the larger of both directions.
+pub fn off_centre(view: &View, buffer: &BuzzBuffer, i: usize) -> f64 {
+    let sample = buffer.sample(i);
+    let w = if sample.surface.is_background() { 0.0 } else { 1.0 };
+    let r = view.raster_from_world(DVec3::ZERO) * sample.position.as_dvec3().extend(w);
+    let (x, y) = ((i % buffer.width()) as f64 + 0.5, (i / buffer.width()) as f64 + 0.5);
+    (r.x / r.w - x).abs().max((r.y / r.w - y).abs())
+}
+
+/// Pixels of a frame that are reused; fails if the classes do not add up.
+pub fn reused(buffer: &BuzzBuffer) -> Result<u64, TestCaseError> {
+    let counts = buffer.count_classes();
+    prop_assert_eq!(counts.iter().sum::<u64>(), buffer.class.len() as u64);
+    prop_assert_eq!(counts[PixelClass::Traced as usize], 0);
+    Ok(PixelClass::ALL.iter().filter(|c| c.is_reused()).map(|&c| counts[c as usize]).sum())
 }
 
 /// Four spheres over the ground.

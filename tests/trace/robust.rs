@@ -1,11 +1,15 @@
 //! Facts that hold for every scene: nothing leaks, nothing is not a number, nothing depends on where the world is.
 
 use crate::rig::*;
-use buzz::accel::{Accel, Sides};
+use buzz::accel::{Accel, Ray, Sides};
 use buzz::frame::RayCounts;
 use buzz::scene::{LightKind, Material, Mesh, Outline, Pose, Scene, Skin};
 use glam::{DAffine3, DMat4, DQuat, DVec3, Vec2, Vec3, Vec4};
 use proptest::prelude::*;
+
+fn ray(origin: Vec3, direction: Vec3, t_max: f32) -> Ray {
+    Ray { origin, direction, t_min: 0.0, t_max }
+}
 
 /// A rolling ground of `n` x `n` squares around the origin, made of exact and of rough coordinates.
 fn ground(n: u32, rough: bool) -> Mesh {
@@ -63,7 +67,7 @@ fn no_ray_slips_between_triangles() {
                     // Through the vertex, and through points on the edge to the next one.
                     for s in [0.0, 0.25, 0.5, 0.7] {
                         let target = pair[0].lerp(pair[1], s);
-                        let hit = accel.intersect(&scene, eye, target - eye, 0.0, 1e3, Sides::Both);
+                        let hit = accel.intersect(&scene, &ray(eye, target - eye, 1e3), Sides::Both);
                         let open = accel.unoccluded(&scene, eye, target - eye, 2.0);
                         leaks += u32::from(hit.is_none_or(|h| h.t > 1.2)) + u32::from(open);
                     }
@@ -231,11 +235,11 @@ fn tiny_scenes_are_met_as_well_as_large_ones() {
         let mesh = Mesh::uv_sphere(1.0, 16, 0);
         let (scene, _, accel) = placed(mesh, DAffine3::from_scale(DVec3::splat(scale)));
         let eye = Vec3::new(0.0, 0.0, 3.0) * scale as f32;
-        let hit = accel.intersect(&scene, eye, Vec3::NEG_Z, 0.0, f32::INFINITY, Sides::Visible).unwrap();
+        let hit = accel.intersect(&scene, &ray(eye, Vec3::NEG_Z, f32::INFINITY), Sides::Visible).unwrap();
         assert!((hit.t / scale as f32 - 2.0).abs() < 0.02);
         // From just above the surface.
         let eye = Vec3::new(0.0, 0.0, 1.001) * scale as f32;
-        assert!(accel.intersect(&scene, eye, Vec3::NEG_Z, 0.0, f32::INFINITY, Sides::Visible).is_some());
+        assert!(accel.intersect(&scene, &ray(eye, Vec3::NEG_Z, f32::INFINITY), Sides::Visible).is_some());
     }
 }
 
@@ -262,7 +266,7 @@ fn moved_hidden_and_deformed_instances_are_met_where_they_are() {
     let height = |accel: &mut Accel, pose: &Pose, origin: DVec3, x: f64| {
         accel.place(&scene, pose, origin);
         let eye = (DVec3::new(x, 9.0, 0.3) - origin).as_vec3();
-        let hit = accel.intersect(&scene, eye, Vec3::NEG_Y, 0.0, 99.0, Sides::Visible)?;
+        let hit = accel.intersect(&scene, &ray(eye, Vec3::NEG_Y, 99.0), Sides::Visible)?;
         let point = accel.surface_point(&scene, hit.surface);
         Some(((point.as_dvec3() + origin).y * 100.0).round() / 100.0)
     };
@@ -293,7 +297,7 @@ fn what_was_thought_to_stand_still_is_met_where_a_pose_puts_it() {
     let mut accel = Accel::new(&scene);
     let height = |accel: &mut Accel, pose: &Pose, x: f32| {
         accel.place(&scene, pose, DVec3::ZERO);
-        let hit = accel.intersect(&scene, Vec3::new(x, 9.0, 0.3), Vec3::NEG_Y, 0.0, 99.0, Sides::Visible)?;
+        let hit = accel.intersect(&scene, &ray(Vec3::new(x, 9.0, 0.3), Vec3::NEG_Y, 99.0), Sides::Visible)?;
         Some((accel.surface_point(&scene, hit.surface).y, 9.0 - hit.t))
     };
     assert_eq!(height(&mut accel, &pose, 5.2), Some((0.0, 0.0)));
@@ -341,7 +345,7 @@ proptest! {
         for (eye, direction) in rays {
             let (eye, direction) = (DVec3::from(eye).as_vec3(), DVec3::from(direction).as_vec3());
             let expected = brute_force(&scene.meshes[0], m, eye.as_dvec3(), direction.as_dvec3());
-            let found = accel.intersect(&scene, eye, direction, 0.0, f32::INFINITY, Sides::Both);
+            let found = accel.intersect(&scene, &ray(eye, direction, f32::INFINITY), Sides::Both);
             let open = accel.unoccluded(&scene, eye, direction, f32::INFINITY);
             prop_assert_eq!(open, found.is_none());
             match (expected, found) {
