@@ -27,8 +27,6 @@ SCENES |= {
     "zdm2_fastpan": WALKS / "zdm2_fastpan.glb",
     "kaykit_dungeon_walk": WALKS / "kaykit_dungeon_walk.glb",
 }
-# Longer ones are interpolated over a part: a minute of it is enough.
-MOST_FRAMES = 120
 TITLES = ["scene", "quality", "ms a frame", "inferred, ms (10-90 %)", "times as fast", "rays a pixel", "PSNR dB"]
 TITLES += ["worst dB", "FLIP", "over 5 %", "hidden"]
 DISTANCES = (1, 2, 4, 8, 12, 16)
@@ -51,7 +49,9 @@ def baseline(binary: Path, scene: Path, out: Path, resolution: str, trade: dict)
     """Interpolation's error on the frames that were measured."""
     plan = json.loads(run(binary, "plan", scene, "--format", "json", "-r", "16x9", "-q", "full"))
     first, last = plan["frames"][0]["frame"], plan["frames"][-1]["frame"]
-    last = min(last, first + MOST_FRAMES - 1)
+    # As far as there are measured frames, and what the flow of those at the ends is made from.
+    first = max(first, min(a for a, _ in trade["spans"]) - interpolate.KEPT)
+    last = min(last, max(b for _, b in trade["spans"]) + interpolate.KEPT)
     options = ["-q", "full", "-r", resolution, "-f", f"{first}-{last}", "--skip-existing", "--progress", "none"]
     run(binary, scene, out, *options)
     frames = {n for a, b in trade["spans"] for n in range(a, b + 1)}
