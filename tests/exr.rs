@@ -17,7 +17,7 @@ use support::{Shape, default_layers, frame, hash, options};
 
 fn sink(folder: &Path, frames: impl IntoIterator<Item = i64>, compression: Compression) -> ExrSink {
     let names = NamePattern::parse("<stem>.%04d.exr", "test").unwrap();
-    ExrSink::new(OutputFolder::open(folder, names, frames).unwrap(), options(compression)).unwrap()
+    ExrSink::new(OutputFolder::open(folder, names, frames.into_iter().map(Into::into)).unwrap(), options(compression)).unwrap()
 }
 
 fn bytes_of(frame: &Frame, compression: Compression) -> Vec<u8> {
@@ -271,12 +271,12 @@ fn a_sequence_is_written_whole_and_recognised() {
         sink.put(default_layers(frame(number, kind, &Shape::whole(64, 50)))).unwrap();
     }
     let seconds = sink.finish().unwrap();
-    assert_eq!(seconds.iter().map(|s| s.0).collect::<Vec<_>>(), (-2..=6).collect::<Vec<_>>());
+    assert_eq!(seconds.iter().map(|s| s.0.number).collect::<Vec<_>>(), (-2..=6).collect::<Vec<_>>());
     assert!(seconds.iter().all(|s| s.1.write > 0.0));
     assert_eq!(sink.repaired(), []);
     for number in -2..=6 {
-        let FrameFile::Complete(stats, kind) = sink.folder().check(number, &hash()) else {
-            panic!("{number}: {:?}", sink.folder().check(number, &hash()));
+        let FrameFile::Complete(stats, kind) = sink.folder().check(number.into(), &hash()) else {
+            panic!("{number}: {:?}", sink.folder().check(number.into(), &hash()));
         };
         assert_eq!(stats, frame(number, kind, &Shape::whole(64, 50)).stats);
         assert_eq!(kind == FrameKind::Traced, number == -2);

@@ -188,6 +188,12 @@ pub struct OutputArgs {
     /// Rays a point to the world, for ambient occlusion; without any the world shines through everything.
     #[arg(long, value_name = "N", default_value_t = 0, allow_negative_numbers = true, value_parser = clap::value_parser!(u32).range(..=4096))]
     pub ambient_samples: u32,
+    /// Render a pair of eyes so far apart, metres, about each camera: a file for the left and one for the right.
+    #[arg(long, value_name = "DISTANCE", allow_negative_numbers = true)]
+    pub stereo: Option<f64>,
+    /// Distance of what both eyes see at the same place, metres [default: infinite, parallel eyes].
+    #[arg(long, value_name = "DISTANCE", requires = "stereo", allow_negative_numbers = true)]
+    pub convergence: Option<f64>,
     /// Cast a ray to every reused sample and report how many are hidden (slow).
     #[arg(long)]
     pub audit: bool,
@@ -198,7 +204,8 @@ pub struct OutputArgs {
     /// Compression of the EXR files.
     #[arg(long, value_enum, default_value = "zip")]
     pub compression: CompressionArg,
-    /// File names, with %04d or #### for the frame number; `<stem>.%04d.exr` if not given.
+    /// File names, with %04d or #### for the frame number; `<stem>.%04d.exr` if not given. In stereo, the eye's
+    /// name is put before the number.
     #[arg(long, value_name = "PATTERN")]
     pub name: Option<String>,
     /// Keep the frames that are there and complete; render the others.

@@ -9,7 +9,7 @@ use super::say;
 use super::{memory, parse};
 use anyhow::{Context, Result};
 use buzz::error::Error;
-use buzz::frame::{Aov, FrameKind, FrameStats};
+use buzz::frame::{Aov, FrameId, FrameKind, FrameStats, StereoEye};
 use buzz::infer::BuzzBuffer;
 use buzz::output::{
     self, Compression, ExrSink, FileOptions, FrameFile, FrameRecord, NamePattern, OutputFolder, Report,
@@ -17,8 +17,8 @@ use buzz::output::{
     WithThumbnails, earlier_runs, peak_bytes,
 };
 use buzz::plan::{Plan, Segment};
-use buzz::scene::Requirements;
-use buzz::sequence::{FrameSink, Observer, render_sequence};
+use buzz::scene::{Projection, Requirements, Scene};
+use buzz::sequence::{FrameSink, Observer, Settings, render_sequence};
 use buzz::trace::lit_words;
 use rayon::prelude::*;
 use std::collections::BTreeSet;
@@ -54,7 +54,8 @@ pub fn run(args: ConvertArgs) -> Result<ExitCode> {
     if let Some(path) = &args.output.report {
         prepare_report(path)?;
     }
-    let folder = OutputFolder::open(out_dir, names, frames.iter().copied())?;
+    let pictures = frames.iter().flat_map(|&f| pictures_of(f, &job.settings));
+    let folder = OutputFolder::open(out_dir, names, pictures)?;
     if !folder.is_locked() {
         let path = folder.path().display();
         say::complain(format_args!(
@@ -68,9 +69,9 @@ pub fn run(args: ConvertArgs) -> Result<ExitCode> {
     };
     let plan_seconds = planning.elapsed().as_secs_f64();
     let hash = settings_hash(&job, &plan, &args);
-    let skipped = existing(&folder, &frames, &hash, &args, &interrupt)?;
+    let skipped = existing(&folder, &frames, &hash, &job.settings, &args, &interrupt)?;
     let to_render: BTreeSet<i64> =
-        frames.difference(&skipped.iter().map(|r| r.number).collect()).copied().collect();
+        frames.difference(&skipped.iter().map(|r| r.id.number).collect()).copied().collect();
     if let Some(limit) = memory_limit.filter(|_| !to_render.is_empty()) {
         memory::refuse_over(limit, &job)?;
     }
@@ -83,10 +84,11 @@ pub fn run(args: ConvertArgs) -> Result<ExitCode> {
     };
     let mut sink = ExrSink::new(folder, options)?;
     let pixels = job.settings.window.pixels() as u64;
-    let progress = Progress::new(args.output.progress, to_render.len(), pixels, interrupt);
+    let count = to_render.iter().flat_map(|&f| pictures_of(f, &job.settings)).count();
+    let progress = Progress::new(args.output.progress, count, pixels, interrupt);
     let mut thumbnails = Thumbnails::of(&frames);
-    for record in &skipped {
-        thumbnails.read(record.number, &sink.folder().file_of(record.number));
+    for record in skipped.iter().filter(|r| r.id.eye != Some(StereoEye::Right)) {
+        thumbnails.read(record.id.number, &sink.folder().file_of(record.id));
     }
     let mut recorder = Recorder { progress, records: skipped };
     let Job { scene, accel, settings, .. } = &mut job;
@@ -97,12 +99,12 @@ pub fn run(args: ConvertArgs) -> Result<ExitCode> {
     recorder.progress.finish();
     rendered?;
     let mut records = recorder.records;
-    for (number, seconds) in written? {
-        if let Some(record) = records.iter_mut().find(|r| r.number == number) {
+    for (id, seconds) in written? {
+        if let Some(record) = records.iter_mut().find(|r| r.id == id) {
             record.stats.seconds.write = seconds.write;
         }
     }
-    records.sort_by_key(|r| r.number);
+    records.sort_by_key(|r| r.id);
     for (frame, values) in sink.repaired() {
         say::complain(format_args!(
             "warning: frame {frame}: {values} values were not finite or too large for their channel and were replaced"
@@ -127,9 +129,12 @@ pub fn run(args: ConvertArgs) -> Result<ExitCode> {
     let report = report(input, hash, &job, &plan, records, runs);
     report.write_json(&report_path)?;
     report.write_html(&report_path.with_extension("html"), &thumbnails.encoded())?;
+    // Of a pair, the left eye is looked at.
+    let names = sink.folder().names();
+    let review_names = if job.settings.stereo.is_some() { names.of_eye(StereoEye::Left) } else { names.clone() };
     let review = Review {
         folder: out_dir,
-        names: sink.folder().names(),
+        names: &review_names,
         frames: &frames,
         cuts: &plan.cuts,
         keyframes: &report.plan.keyframes,
@@ -176,6 +181,8 @@ fn choose_image(job: &mut Job, args: &ConvertArgs) -> Result<()> {
             Error::Usage(format!("--exposure {}: expected a number of stops", args.output.exposure)).into()
         );
     }
+    settings.stereo =
+        args.output.stereo.map(|eyes| parse::stereo(eyes, args.output.convergence)).transpose()?;
     settings.aovs = parse::aovs(&args.output.aov)?;
     settings.transparent = args.output.transparent;
     settings.exposure = args.output.exposure;
@@ -183,7 +190,35 @@ fn choose_image(job: &mut Job, args: &ConvertArgs) -> Result<()> {
     settings.light_samples = args.output.light_samples;
     settings.ambient_samples = args.output.ambient_samples;
     settings.audit = args.output.audit;
+    if settings.stereo.is_some() {
+        refuse_parallel(&job.scene, settings)?;
+    }
     Ok(())
+}
+
+/// Parallel rays show both eyes the same.
+fn refuse_parallel(scene: &Scene, settings: &Settings) -> Result<()> {
+    let cameras: BTreeSet<usize> =
+        (scene.timing.first..=scene.timing.last).map(|f| scene.camera_at(f, settings.camera)).collect();
+    let parallel = |&&c: &&usize| matches!(scene.cameras[c].lens.projection, Projection::Orthographic { .. });
+    match cameras.iter().find(parallel) {
+        Some(&c) => {
+            let name = &scene.cameras[c].name;
+            let message =
+                format!("--stereo: camera {name} is orthographic, and has no parallax; choose another by --camera");
+            Err(Error::Usage(message).into())
+        }
+        None => Ok(()),
+    }
+}
+
+/// Each frame's pictures: one, or the eyes'.
+fn pictures_of(frame: i64, settings: &Settings) -> impl Iterator<Item = FrameId> {
+    let eyes: &[Option<StereoEye>] = match settings.stereo {
+        Some(_) => &[Some(StereoEye::Left), Some(StereoEye::Right)],
+        None => &[None],
+    };
+    eyes.iter().map(move |&eye| FrameId { number: frame, eye })
 }
 
 /// Identifies everything that decides the pixels: the scene as read, the settings, the plan, and the program's version.
@@ -212,6 +247,7 @@ fn existing(
     folder: &OutputFolder,
     frames: &BTreeSet<i64>,
     hash: &SettingsHash,
+    settings: &Settings,
     args: &ConvertArgs,
     interrupt: &Interrupt,
 ) -> Result<Vec<FrameRecord>> {
@@ -219,22 +255,25 @@ fn existing(
         return Ok(Vec::new());
     }
     if !args.output.skip_existing {
-        if let Some(path) = frames.iter().map(|&number| folder.file_of(number)).find(|path| path.exists()) {
+        let pictures = || frames.iter().flat_map(|&number| pictures_of(number, settings));
+        if let Some(path) = pictures().map(|id| folder.file_of(id)).find(|path| path.exists()) {
             let message = "is there already; give --skip-existing to keep finished frames, or --overwrite to replace them";
             return Err(Error::output(path, message).into());
         }
         return Ok(Vec::new());
     }
     // Each file is read in full: thousands of them take their time.
-    let check = |&number: &i64| match interrupt.stop_requested() {
-        Some(signal) => Err(Error::Interrupted { signal }),
-        None => Ok(match folder.check(number, hash) {
-            FrameFile::Complete(stats, kind) => Some(FrameRecord { number, kind, stats, skipped: true }),
-            FrameFile::Missing | FrameFile::Stale(_) => None,
-        }),
+    let check = |id: FrameId| match folder.check(id, hash) {
+        FrameFile::Complete(stats, kind) => Some(FrameRecord { id, kind, stats, skipped: true }),
+        FrameFile::Missing | FrameFile::Stale(_) => None,
     };
-    let found = frames.par_iter().map(check).collect::<buzz::Result<Vec<_>>>()?;
-    Ok(found.into_iter().flatten().collect())
+    // A pair is there if both of it are.
+    let check_all = |&number: &i64| match interrupt.stop_requested() {
+        Some(signal) => Err(Error::Interrupted { signal }),
+        None => Ok(pictures_of(number, settings).map(check).collect::<Option<Vec<_>>>()),
+    };
+    let found = frames.par_iter().map(check_all).collect::<buzz::Result<Vec<_>>>()?;
+    Ok(found.into_iter().flatten().flatten().collect())
 }
 
 fn compression(compression: CompressionArg) -> Compression {
@@ -262,11 +301,11 @@ struct Recorder {
 }
 
 impl Observer for Recorder {
-    fn frame_done(&mut self, number: i64, kind: FrameKind, stats: &FrameStats, wanted: bool) {
+    fn frame_done(&mut self, id: FrameId, kind: FrameKind, stats: &FrameStats, wanted: bool) {
         if wanted {
-            self.records.push(FrameRecord { number, kind, stats: *stats, skipped: false });
+            self.records.push(FrameRecord { id, kind, stats: *stats, skipped: false });
         }
-        self.progress.frame_done(number, kind, stats, wanted);
+        self.progress.frame_done(id, kind, stats, wanted);
     }
 
     fn stop_requested(&self) -> Option<i32> {

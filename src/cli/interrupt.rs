@@ -3,7 +3,7 @@
 
 use super::say;
 use buzz::error::Error;
-use buzz::frame::{FrameKind, FrameStats};
+use buzz::frame::{FrameId, FrameKind, FrameStats};
 use buzz::sequence::Observer;
 use signal_hook::consts::{SIGINT, SIGTERM};
 use signal_hook::iterator::Signals;
@@ -44,7 +44,7 @@ impl Interrupt {
 }
 
 impl Observer for Interrupt {
-    fn frame_done(&mut self, _: i64, _: FrameKind, _: &FrameStats, _: bool) {}
+    fn frame_done(&mut self, _: FrameId, _: FrameKind, _: &FrameStats, _: bool) {}
 
     fn stop_requested(&self) -> Option<i32> {
         Some(self.signal.load(SeqCst)).filter(|&signal| signal != 0)

@@ -5,7 +5,7 @@ use anyhow::Result;
 use buzz::error::Error;
 use buzz::infer::{BuzzBuffer, Inference};
 use buzz::output::{ExrSink, peak_bytes};
-use buzz::sequence::RENDER_BUFFERS;
+use buzz::sequence::render_buffers;
 use buzz::trace::lit_words;
 
 /// Stacks, and what each thread encodes at a time.
@@ -38,7 +38,8 @@ fn rendering(job: &Job) -> u64 {
     let (settings, scene) = (&job.settings, &job.scene);
     let lights = scene.lights.len();
     let words = lit_words(scene, settings.trace_options());
-    let inference = RENDER_BUFFERS * BuzzBuffer::bytes_per_pixel(words) + Inference::bytes_per_pixel(words);
+    let inference =
+        render_buffers(settings) * BuzzBuffer::bytes_per_pixel(words) + Inference::bytes_per_pixel(words);
     // One frame is filled while others are encoded; a file is at most as large as the layers that it is made of.
     let frame = settings.aovs.bytes_per_pixel(lights);
     let frames = (ExrSink::IN_FLIGHT + 1) * frame + ExrSink::IN_FLIGHT * frame;

@@ -2,7 +2,7 @@
 
 use buzz::error::{Error, Result};
 use buzz::frame::{Aov, AovSet, Window};
-use buzz::scene::Rational;
+use buzz::scene::{Rational, Stereo};
 use std::collections::BTreeSet;
 
 /// More frames than anyone renders in one run; a typo in a range must not fill the memory.
@@ -136,6 +136,17 @@ pub fn crop(text: &str, full: (u32, u32)) -> Result<Window> {
     } else {
         Err(error())
     }
+}
+
+/// The distances of a stereo pair.
+pub fn stereo(interocular: f64, convergence: Option<f64>) -> Result<Stereo> {
+    let distance = |option: &str, value: f64| {
+        let usable = value > 0.0 && value.is_finite();
+        usable.then_some(value).ok_or_else(|| usage(option, &value.to_string(), "metres, more than 0"))
+    };
+    let interocular = distance("--stereo", interocular)?;
+    let convergence = convergence.map_or(Ok(f64::INFINITY), |c| distance("--convergence", c))?;
+    Ok(Stereo { interocular, convergence })
 }
 
 /// A comma list of layers.

@@ -3,7 +3,7 @@
 use super::args::ProgressArg;
 use super::interrupt::Interrupt;
 use super::say;
-use buzz::frame::{FrameKind, FrameStats, RayCounts};
+use buzz::frame::{FrameId, FrameKind, FrameStats, RayCounts, StereoEye};
 use buzz::sequence::Observer;
 use indicatif::{HumanDuration, ProgressBar, ProgressDrawTarget, ProgressStyle};
 use std::io::IsTerminal;
@@ -80,21 +80,22 @@ impl Progress {
         Duration::from_secs_f64(each * self.total.saturating_sub(self.done) as f64)
     }
 
-    fn say(&self, number: i64, kind: FrameKind, stats: &FrameStats) {
+    fn say(&self, frame: FrameId, kind: FrameKind, stats: &FrameStats) {
         let saved =
             self.tally.saved().map(|s| format!(", {:.1} % of rays saved", s * 100.0)).unwrap_or_default();
         let how = match kind {
             FrameKind::Traced => "traced".to_owned(),
+            FrameKind::Inferred { .. } if frame.eye == Some(StereoEye::Right) => "inferred from left".into(),
             FrameKind::Inferred { from } => format!("inferred from {from}"),
         };
         let share = 100.0 * stats.rays.primary as f64 / self.pixels.max(1) as f64;
         match &self.style {
             Style::Bar(bar) => {
-                bar.set_message(format!("frame {number} {how}{saved}"));
+                bar.set_message(format!("frame {frame} {how}{saved}"));
                 bar.inc(1);
             }
             Style::Plain => say::line(format_args!(
-                "frame {number}: {how}, {share:.1} % of pixels traced; {}/{}{saved}, {} left",
+                "frame {frame}: {how}, {share:.1} % of pixels traced; {}/{}{saved}, {} left",
                 self.done,
                 self.total,
                 HumanDuration(self.left())
@@ -102,7 +103,7 @@ impl Progress {
             Style::Openjd => {
                 let percent = 100.0 * self.done as f64 / self.total.max(1) as f64;
                 let lines =
-                    format!("openjd_progress: {percent:.1}\nopenjd_status: frame {number} {how}{saved}\n");
+                    format!("openjd_progress: {percent:.1}\nopenjd_status: frame {frame} {how}{saved}\n");
                 // A reader that cannot be reached is no error of the frame's.
                 let _ = say::result(&lines);
             }
@@ -120,13 +121,13 @@ fn bar(total: usize) -> ProgressBar {
 }
 
 impl Observer for Progress {
-    fn frame_done(&mut self, number: i64, kind: FrameKind, stats: &FrameStats, wanted: bool) {
+    fn frame_done(&mut self, frame: FrameId, kind: FrameKind, stats: &FrameStats, wanted: bool) {
         if !wanted {
             return;
         }
         self.done += 1;
         self.tally.add(kind, stats.rays);
-        self.say(number, kind, stats);
+        self.say(frame, kind, stats);
     }
 
     fn stop_requested(&self) -> Option<i32> {

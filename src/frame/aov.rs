@@ -1,6 +1,6 @@
 //! A finished frame and its layers.
 
-use super::FrameStats;
+use super::{FrameId, FrameStats, StereoEye};
 use crate::scene::View;
 use std::sync::Arc;
 
@@ -9,9 +9,9 @@ use std::sync::Arc;
 pub enum FrameKind {
     /// Every pixel traced: a key frame.
     Traced,
-    /// Made from a neighbour.
+    /// Made from a neighbour; in stereo, a right eye from the left one.
     Inferred {
-        /// The neighbour's frame number.
+        /// The neighbour's frame number; a right eye's is its own.
         from: i64,
     },
 }
@@ -140,6 +140,8 @@ pub struct Matte {
 pub struct Frame {
     /// Frame number.
     pub number: i64,
+    /// Whose it is, in stereo.
+    pub eye: Option<StereoEye>,
     /// Key frame or inferred.
     pub kind: FrameKind,
     /// The camera, and the size of the full image.
@@ -181,4 +183,9 @@ pub struct Frame {
 impl Frame {
     /// Depth written where only the background is seen: finite, because infinity breaks compositing tools.
     pub const FAR_DEPTH: f32 = 1e10;
+
+    /// Its number and eye.
+    pub fn id(&self) -> FrameId {
+        FrameId { number: self.number, eye: self.eye }
+    }
 }

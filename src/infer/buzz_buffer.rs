@@ -265,10 +265,20 @@ impl Projector {
             let seen = self.perspective && r.w > 0.0;
             return seen.then(|| Projected { x: r.x / r.w, y: r.y / r.w, z: f32::INFINITY });
         }
-        let from_eye = if self.perspective { position - self.eye } else { self.forward };
         let r = self.raster_from_world * position.extend(1.0);
-        let seen = r.z >= self.near && r.z <= self.far && r.w > 0.0 && from_eye.dot(normal) < 0.0;
+        let seen = r.z >= self.near && r.z <= self.far && r.w > 0.0 && self.faces(position, normal);
         seen.then(|| Projected { x: r.x / r.w, y: r.y / r.w, z: r.z })
+    }
+
+    /// The raster column, with its fraction, of a point before the eye or a direction towards the background.
+    pub(super) fn column(&self, position: Vec3, background: bool) -> f32 {
+        let r = self.raster_from_world * position.extend(if background { 0.0 } else { 1.0 });
+        r.x / r.w
+    }
+
+    /// True if a point's surface is turned to the eye.
+    pub(super) fn faces(&self, position: Vec3, normal: Vec3) -> bool {
+        self.direction_to(position).dot(normal) < 0.0
     }
 
     /// Planar depth of a sample; infinite for the background.

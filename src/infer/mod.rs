@@ -15,6 +15,7 @@
 //! | L, C, C1, (endx, endy), int_z | `Line` in `obscured.rs` |
 //! | test_z | in [`creeping()`] |
 //! | P, k | [`entering()`] |
+//! | X + e z_p / (d + z_p) | [`Parallax`], [`other_eye()`] |
 //! | (not in the paper) samples at pixel centres, shadows' edges followed | [`Centring`] |
 
 mod around;
@@ -25,6 +26,7 @@ mod entering;
 mod obscured;
 mod project;
 mod shadow_edges;
+mod stereo;
 
 pub use around::Trust;
 pub use buzz_buffer::{BuzzBuffer, CastRays, Projected, Projector, UNKNOWN};
@@ -33,6 +35,7 @@ pub use creeping::{Along, creeping};
 pub use entering::entering;
 pub use obscured::obscured;
 pub use project::{Landings, gather, project};
+pub use stereo::{Parallax, other_eye};
 
 use crate::frame::{PixelClass, RayCounts};
 use crate::scene::View;
@@ -49,6 +52,15 @@ pub struct Inference {
     landings: Landings,
     marks: Marks,
     centring: Centring,
+}
+
+/// What lies between the old view and the new.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Move {
+    /// Any camera move.
+    Camera,
+    /// From the left eye of a stereo pair to the right one.
+    OtherEye,
 }
 
 /// What inferring a frame took.
@@ -72,6 +84,7 @@ impl Inference {
     /// to hide something before it; every other pixel is traced through its centre.
     pub fn infer(
         &mut self,
+        by: Move,
         (old, old_view): (&BuzzBuffer, &View),
         (new, new_view): (&mut BuzzBuffer, &View),
         origin: DVec3,
@@ -79,7 +92,7 @@ impl Inference {
     ) -> Cost {
         let to = Projector::new(new_view, origin);
         let mut cost = Cost::default();
-        self.reproject(old, old_view, new_view, origin);
+        self.reproject(by, old, old_view, new_view, origin);
         gather(old, &self.landings, &self.marks, new);
 
         // Ray-cast the positions that nothing explains, then the gaps that opened inside objects.
@@ -95,6 +108,7 @@ impl Inference {
     /// Makes `new` as [`Inference::infer`] does, but with every sample at its pixel's centre (past the paper).
     pub fn infer_centred(
         &mut self,
+        by: Move,
         (old, old_view): (&BuzzBuffer, &View),
         (new, new_view): (&mut BuzzBuffer, &View),
         origin: DVec3,
@@ -103,7 +117,7 @@ impl Inference {
     ) -> Cost {
         let to = Projector::new(new_view, origin);
         let mut cost = Cost::default();
-        self.reproject(old, old_view, new_view, origin);
+        self.reproject(by, old, old_view, new_view, origin);
 
         // Centre what lies within surfaces; cast rays at edges, at what nothing explains, and along shadows' edges.
         self.centring.recentre(old, (&self.landings, &self.marks), &to, rays, trust, new);
@@ -112,7 +126,7 @@ impl Inference {
     }
 
     /// Finds which old sample each new pixel shows, and where that is not to be believed.
-    fn reproject(&mut self, old: &BuzzBuffer, old_view: &View, new_view: &View, origin: DVec3) {
+    fn reproject(&mut self, by: Move, old: &BuzzBuffer, old_view: &View, new_view: &View, origin: DVec3) {
         let (landings, marks) = (&mut self.landings, &mut self.marks);
         let (from, to) = (Projector::new(old_view, origin), Projector::new(new_view, origin));
 
@@ -120,11 +134,17 @@ impl Inference {
         landings.clear(old.object.len());
         marks.clear(old.object.len());
 
-        // Project the old pixels; the nearest hit wins.
-        let nearest = project(old, &to, landings, marks);
-
-        // Clear what the line L behind an old hit could be hiding.
-        obscured(old, &from, &to, landings, marks);
+        let nearest = match by {
+            Move::Camera => {
+                // Project the old pixels; the nearest hit wins.
+                let nearest = project(old, &to, landings, marks);
+                // Clear what the line L behind an old hit could be hiding.
+                obscured(old, &from, &to, landings, marks);
+                nearest
+            }
+            // Both at once, along the scan-lines.
+            Move::OtherEye => other_eye(old, &Parallax::between(old_view, new_view, origin), landings, marks),
+        };
 
         // Clear the contested area, where new objects may come in: k is the nearest that is known.
         if let Some(k) = nearest {

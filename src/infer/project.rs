@@ -22,6 +22,14 @@ impl Landings {
         self.0.par_iter_mut().with_min_len(1 << 14).for_each(|l| *l.get_mut() = EMPTY);
     }
 
+    /// Lands old sample `i` at depth `z` on a pixel; marks the pixel if another is there.
+    pub(super) fn land(&self, pixel: usize, z: f32, i: usize, marks: &Marks) {
+        let landing = u64::from(z.to_bits()) << 32 | i as u64;
+        if self.0[pixel].fetch_min(landing, Relaxed) != EMPTY {
+            marks.set(pixel, PixelClass::Overlapped);
+        }
+    }
+
     /// Depth of what landed on the pixel; none where nothing did.
     pub fn z(&self, pixel: usize) -> Option<f32> {
         let landing = self.0[pixel].load(Relaxed);
@@ -49,10 +57,7 @@ pub fn project(old: &BuzzBuffer, new_view: &Projector, landings: &Landings, mark
             };
             nearest = nearest.min(p.z);
             let Some(pixel) = new_view.pixel(p.x, p.y) else { continue };
-            let landing = u64::from(p.z.to_bits()) << 32 | i as u64;
-            if landings.0[pixel].fetch_min(landing, Relaxed) != EMPTY {
-                marks.set(pixel, PixelClass::Overlapped);
-            }
+            landings.land(pixel, p.z, i, marks);
         }
         nearest
     };

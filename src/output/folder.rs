@@ -3,6 +3,7 @@
 use super::write::{explain, remove_leftovers};
 use super::{FrameFile, FrameLock, NamePattern, SettingsHash};
 use crate::Result;
+use crate::frame::FrameId;
 use std::path::{Path, PathBuf};
 
 /// A folder in which this run alone may write its frames, until this is dropped.
@@ -19,9 +20,9 @@ impl OutputFolder {
     ///
     /// # Errors
     /// [`crate::Error::Output`] if the folder cannot be made or written, or another run is writing one of the frames.
-    pub fn open(path: &Path, names: NamePattern, frames: impl IntoIterator<Item = i64>) -> Result<Self> {
+    pub fn open(path: &Path, names: NamePattern, frames: impl IntoIterator<Item = FrameId>) -> Result<Self> {
         std::fs::create_dir_all(path).map_err(|e| explain(path, &e))?;
-        let files: Vec<String> = frames.into_iter().map(|frame| names.file_name(frame)).collect();
+        let files: Vec<String> = frames.into_iter().map(|id| names.file_of(id)).collect();
         let lock = FrameLock::acquire(path, &files)?;
         remove_leftovers(path, &files.into_iter().collect())?;
         Ok(Self { path: path.to_path_buf(), names, lock })
@@ -33,8 +34,8 @@ impl OutputFolder {
     }
 
     /// Where `frame` is written.
-    pub fn file_of(&self, frame: i64) -> PathBuf {
-        self.path.join(self.names.file_name(frame))
+    pub fn file_of(&self, frame: FrameId) -> PathBuf {
+        self.path.join(self.names.file_of(frame))
     }
 
     /// What the frames are called.
@@ -43,7 +44,7 @@ impl OutputFolder {
     }
 
     /// What stands there now.
-    pub fn check(&self, frame: i64, settings_hash: &SettingsHash) -> FrameFile {
+    pub fn check(&self, frame: FrameId, settings_hash: &SettingsHash) -> FrameFile {
         FrameFile::check(&self.file_of(frame), settings_hash)
     }
 

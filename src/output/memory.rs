@@ -1,7 +1,7 @@
 //! Sinks that write no files: for tests, measurements and callers of the library.
 
 use crate::Result;
-use crate::frame::{Frame, StageSeconds};
+use crate::frame::{Frame, FrameId, StageSeconds};
 use crate::sequence::FrameSink;
 
 /// Keeps every frame.
@@ -21,7 +21,7 @@ impl FrameSink for MemorySink {
         Ok(())
     }
 
-    fn finish(&mut self) -> Result<Vec<(i64, StageSeconds)>> {
+    fn finish(&mut self) -> Result<Vec<(FrameId, StageSeconds)>> {
         Ok(Vec::new())
     }
 }
@@ -42,7 +42,7 @@ impl FrameSink for NullSink {
         Ok(())
     }
 
-    fn finish(&mut self) -> Result<Vec<(i64, StageSeconds)>> {
+    fn finish(&mut self) -> Result<Vec<(FrameId, StageSeconds)>> {
         Ok(Vec::new())
     }
 }

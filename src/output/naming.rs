@@ -1,5 +1,6 @@
 //! File names of frames: `--name` patterns, and the frame number in a name.
 
+use crate::frame::{FrameId, StereoEye};
 use crate::{Error, Result};
 
 /// A pattern for the names of a sequence's files, such as `walk.%04d.exr` or `walk.####.exr`.
@@ -78,6 +79,21 @@ impl NamePattern {
         (&self.prefix, &self.suffix, self.width)
     }
 
+    /// The name of the file of a frame and eye.
+    pub fn file_of(&self, frame: FrameId) -> String {
+        frame.eye.map_or_else(|| self.file_name(frame.number), |eye| self.of_eye(eye).file_name(frame.number))
+    }
+
+    /// The pattern of one eye's files: its name stands before the frame number, as in `walk.left.%04d.exr`.
+    #[must_use]
+    pub fn of_eye(&self, eye: StereoEye) -> Self {
+        let separator = self.prefix.chars().next_back().filter(|c| ['.', '_', '-'].contains(c));
+        let stem = separator.map_or(self.prefix.as_str(), |c| self.prefix.trim_end_matches(c));
+        let joint = if stem.is_empty() { String::new() } else { separator.unwrap_or('.').to_string() };
+        let prefix = format!("{stem}{joint}{}{}", eye.name(), separator.unwrap_or('.'));
+        Self { prefix, ..self.clone() }
+    }
+
     /// The name of `frame`'s file. Negative numbers are written as C's `%04d` does: `-001`.
     pub fn file_name(&self, frame: i64) -> String {
         format!("{}{frame:0width$}{}", self.prefix, self.suffix, width = self.width)
@@ -125,6 +141,21 @@ mod tests {
         assert_eq!(name("a.%3d.exr", 7), "a.007.exr");
         assert_eq!(name("100%%.%02d.exr", 123), "100%.123.exr");
         assert_eq!(name("é<stem>#.exr", 1), "éwalk1.exr");
+    }
+
+    #[test]
+    fn eyes_stand_before_the_number() {
+        let of = |pattern: &str| {
+            let frame = FrameId { number: 7, eye: Some(StereoEye::Right) };
+            NamePattern::parse(pattern, "walk").unwrap().file_of(frame)
+        };
+        assert_eq!(of(NamePattern::DEFAULT), "walk.right.0007.exr");
+        assert_eq!(of("a_####.beauty.exr"), "a_right_0007.beauty.exr");
+        assert_eq!(of("shot%04d.exr"), "shot.right.0007.exr");
+        assert_eq!(of("%04d.exr"), "right.0007.exr");
+        for pattern in [NamePattern::DEFAULT, "%04d.exr"] {
+            assert_eq!(number_in_name(&of(pattern)), Some(7));
+        }
     }
 
     #[test]

@@ -3,7 +3,7 @@
 use super::SettingsHash;
 use super::runs::{Run, RunSeconds};
 use super::write::write_alone;
-use crate::frame::{FrameKind, FrameStats, PixelClass, RayCounts, StageSeconds};
+use crate::frame::{FrameId, FrameKind, FrameStats, PixelClass, RayCounts, StageSeconds, StereoEye};
 use crate::plan;
 use crate::scene::{Ignored, Rational};
 use crate::{Error, Result};
@@ -35,8 +35,8 @@ pub struct ReportInput {
 /// A frame of the run.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FrameRecord {
-    /// Frame number.
-    pub number: i64,
+    /// Which frame.
+    pub id: FrameId,
     /// How it was made.
     pub kind: FrameKind,
     /// Its counts and times.
@@ -227,9 +227,12 @@ pub struct TotalSeconds {
 pub struct FrameReport {
     /// Frame number.
     pub frame: i64,
+    /// Whose it is; only in stereo.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub eye: Option<StereoEye>,
     /// `traced` or `inferred`.
     pub kind: String,
-    /// The neighbour that an inferred frame was made from.
+    /// The neighbour that an inferred frame was made from; of a right eye, its own number.
     pub from: Option<i64>,
     /// Pixels of each class, by its name.
     pub pixels: Map<String, Value>,
@@ -322,6 +325,13 @@ impl Totals {
     }
 }
 
+impl FrameReport {
+    /// Its number and eye.
+    pub fn id(&self) -> FrameId {
+        FrameId { number: self.frame, eye: self.eye }
+    }
+}
+
 impl From<&FrameRecord> for FrameReport {
     fn from(record: &FrameRecord) -> Self {
         let (kind, from) = match record.kind {
@@ -329,7 +339,8 @@ impl From<&FrameRecord> for FrameReport {
             FrameKind::Inferred { from } => ("inferred", Some(from)),
         };
         Self {
-            frame: record.number,
+            frame: record.id.number,
+            eye: record.id.eye,
             kind: kind.into(),
             from,
             pixels: pixels_by_name(&record.stats.pixels),
@@ -374,7 +385,7 @@ mod tests {
     }
 
     fn report() -> Report {
-        let record = |number, kind, stats| FrameRecord { number, kind, stats, skipped: false };
+        let record = |number: i64, kind, stats| FrameRecord { id: number.into(), kind, stats, skipped: false };
         Report::new(ReportInput {
             input: "anim.gltf".into(),
             settings: Settings { quality: "half-pixel".into(), fps: [24_000, 1001], ..Settings::default() },

@@ -6,7 +6,7 @@
 
 use super::report::{FrameReport, Report, microseconds};
 use super::{FrameRecord, SettingsHash};
-use crate::frame::StageSeconds;
+use crate::frame::{FrameId, StageSeconds};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeSet;
 use std::path::Path;
@@ -71,7 +71,7 @@ pub fn earlier_runs(
         };
         let mut used = false;
         for record in records.iter_mut().filter(|r| r.skipped) {
-            if let Some(seconds) = seconds_of(&report, record.number) {
+            if let Some(seconds) = seconds_of(&report, record.id) {
                 record.stats.seconds = seconds;
                 used = true;
             }
@@ -98,8 +98,8 @@ fn read(path: &Path) -> Option<Report> {
 }
 
 /// A frame's times, if the report has any.
-fn seconds_of(report: &Report, number: i64) -> Option<StageSeconds> {
-    let at = report.frames.binary_search_by_key(&number, |frame: &FrameReport| frame.frame).ok()?;
+fn seconds_of(report: &Report, id: FrameId) -> Option<StageSeconds> {
+    let at = report.frames.binary_search_by_key(&id, FrameReport::id).ok()?;
     Some(report.frames[at].seconds).filter(|&seconds| seconds != StageSeconds::default())
 }
 
@@ -117,7 +117,7 @@ mod tests {
     fn record(number: i64, trace: f64) -> FrameRecord {
         let seconds = StageSeconds { trace, ..StageSeconds::default() };
         let stats = FrameStats { seconds, ..FrameStats::default() };
-        FrameRecord { number, kind: FrameKind::Traced, stats, skipped: trace == 0.0 }
+        FrameRecord { id: number.into(), kind: FrameKind::Traced, stats, skipped: trace == 0.0 }
     }
 
     fn run(report: &str, started: u64, peak_bytes: u64) -> Run {

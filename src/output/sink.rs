@@ -6,7 +6,7 @@
 use super::exr::{EncodedFrame, FileOptions, encode};
 use super::folder::OutputFolder;
 use super::write::write_whole;
-use crate::frame::{Frame, StageSeconds};
+use crate::frame::{Frame, FrameId, StageSeconds};
 use crate::sequence::FrameSink;
 use crate::{Error, Result};
 use std::path::{Path, PathBuf};
@@ -30,7 +30,7 @@ pub struct ExrSink {
 
 /// A frame on its way to the disk.
 struct Job {
-    number: i64,
+    id: FrameId,
     path: PathBuf,
     file: EncodedFrame,
     /// Seconds that encoding took.
@@ -49,8 +49,8 @@ struct State {
     free: Vec<Frame>,
     error: Option<Error>,
     failed: bool,
-    seconds: Vec<(i64, StageSeconds)>,
-    repaired: Vec<(i64, u64)>,
+    seconds: Vec<(FrameId, StageSeconds)>,
+    repaired: Vec<(FrameId, u64)>,
 }
 
 impl ExrSink {
@@ -79,7 +79,7 @@ impl ExrSink {
     }
 
     /// Frames in which values were not finite or did not fit their channel, and how many; known after `finish`.
-    pub fn repaired(&self) -> Vec<(i64, u64)> {
+    pub fn repaired(&self) -> Vec<(FrameId, u64)> {
         let mut repaired = self.shared.lock().repaired.clone();
         repaired.sort_unstable();
         repaired
@@ -150,19 +150,19 @@ impl FrameSink for ExrSink {
         drop(state);
         let Some(encoded) = self.encoded.clone() else { return Ok(()) };
         let (shared, options) = (Arc::clone(&self.shared), Arc::clone(&self.options));
-        let path = self.folder.file_of(frame.number);
+        let path = self.folder.file_of(frame.id());
         rayon::spawn(move || {
             let start = Instant::now();
-            let number = frame.number;
+            let id = frame.id();
             let result = encode(&frame, &options);
             let seconds = start.elapsed().as_secs_f64();
             shared.lock().free.push(frame);
             match result {
                 Ok(file) => {
                     // The writer lives as long as the sink, and the sink waits for every frame in flight.
-                    if encoded.send(Job { number, path, file, seconds }).is_err() {
+                    if encoded.send(Job { id, path, file, seconds }).is_err() {
                         shared.land(|s| {
-                            s.fail(Error::Frame { frame: number, message: "the writer has stopped".into() })
+                            s.fail(Error::Frame { frame: id.number, message: "the writer has stopped".into() })
                         });
                     }
                 }
@@ -172,11 +172,11 @@ impl FrameSink for ExrSink {
         Ok(())
     }
 
-    fn finish(&mut self) -> Result<Vec<(i64, StageSeconds)>> {
+    fn finish(&mut self) -> Result<Vec<(FrameId, StageSeconds)>> {
         let mut state = self.wait(|s| s.in_flight == 0);
         state.take_error(self.folder.path())?;
         let mut seconds = std::mem::take(&mut state.seconds);
-        seconds.sort_by_key(|(number, _)| *number);
+        seconds.sort_by_key(|(id, _)| *id);
         Ok(seconds)
     }
 }
@@ -194,7 +194,7 @@ impl Drop for ExrSink {
 
 /// The writer's thread: one file after the other; none after the first that fails.
 fn write_all(jobs: &Receiver<Job>, shared: &Shared) {
-    for Job { number, path, file, seconds } in jobs {
+    for Job { id, path, file, seconds } in jobs {
         if shared.lock().failed {
             shared.land(|_| ());
             continue;
@@ -204,9 +204,9 @@ fn write_all(jobs: &Receiver<Job>, shared: &Shared) {
         let write = seconds + start.elapsed().as_secs_f64();
         shared.land(|state| match result {
             Ok(()) => {
-                state.seconds.push((number, StageSeconds { write, ..StageSeconds::default() }));
+                state.seconds.push((id, StageSeconds { write, ..StageSeconds::default() }));
                 if file.repaired > 0 {
-                    state.repaired.push((number, file.repaired));
+                    state.repaired.push((id, file.repaired));
                 }
             }
             Err(error) => state.fail(error),

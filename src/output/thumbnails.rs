@@ -4,7 +4,7 @@
 //! already. Their number, their size and what they take in a page are bounded, however long the sequence is.
 
 use crate::Result;
-use crate::frame::{Frame, StageSeconds};
+use crate::frame::{Frame, FrameId, StageSeconds, StereoEye};
 use crate::measure::{Exposure, Percentile, picture, read_frame};
 use crate::sequence::FrameSink;
 use base64::Engine;
@@ -205,17 +205,15 @@ impl FrameSink for WithThumbnails<'_> {
     }
 
     fn put(&mut self, frame: Frame) -> Result<()> {
-        self.thumbnails.add(
-            frame.number,
-            frame.window.width as usize,
-            &frame.color,
-            &frame.depth,
-            &frame.class,
-        );
+        // Of a pair, the left eye's are enough to find one's way.
+        if frame.eye != Some(StereoEye::Right) {
+            let width = frame.window.width as usize;
+            self.thumbnails.add(frame.number, width, &frame.color, &frame.depth, &frame.class);
+        }
         self.sink.put(frame)
     }
 
-    fn finish(&mut self) -> Result<Vec<(i64, StageSeconds)>> {
+    fn finish(&mut self) -> Result<Vec<(FrameId, StageSeconds)>> {
         self.sink.finish()
     }
 }

@@ -1,6 +1,6 @@
 //! Cameras, lenses, and the view of one frame: the mapping between pixels and the world.
 
-use crate::frame::Window;
+use crate::frame::{StereoEye, Window};
 use glam::{DMat4, DVec2, DVec3, DVec4};
 
 /// A camera and the node that carries it. It looks along the node's -Z, +Y up.
@@ -92,6 +92,15 @@ pub struct View {
     pub pixel_aspect: f64,
 }
 
+/// The geometry of a stereo pair.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Stereo {
+    /// Distance between the eyes, metres.
+    pub interocular: f64,
+    /// Planar distance of what both eyes see at the same place of the image, metres; infinite for parallel eyes.
+    pub convergence: f64,
+}
+
 /// A ray in double precision; `direction` has planar length 1 (its component along the view is 1).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct CameraRay {
@@ -130,6 +139,20 @@ impl View {
             Projection::Orthographic { xmag, ymag } => (*xmag, *ymag) = (*xmag * part.x, *ymag * part.y),
         }
         Self { lens, width: window.width, height: window.height, ..*self }
+    }
+
+    /// What an eye of a stereo pair sees whose midpoint is this view's eye: off-axis, so that both windows meet in the
+    /// plane of zero parallax.
+    #[must_use]
+    pub fn of_eye(&self, stereo: Stereo, eye: StereoEye) -> Self {
+        let side = match eye {
+            StereoEye::Left => -0.5,
+            StereoEye::Right => 0.5,
+        };
+        let aside = side * stereo.interocular;
+        let mut lens = self.lens;
+        lens.shift.x -= aside / (stereo.convergence * self.half_extent().x);
+        Self { eye: self.eye + self.right * aside, lens, ..*self }
     }
 
     /// True for a pinhole camera.
@@ -239,6 +262,28 @@ mod tests {
             let (a, b) = (whole.ray(100.5 + 3.0, 37.5 + 150.0), part.ray(3.5, 150.5));
             assert!((a.origin - b.origin).length() < 1e-12 && (a.direction - b.direction).length() < 1e-12);
         }
+    }
+
+    #[test]
+    fn the_eyes_of_a_pair_agree_on_the_plane_of_zero_parallax() {
+        let middle = view(Projection::Perspective { yfov: 0.8 });
+        let place = |eye, point: DVec3, stereo| {
+            let r = middle.of_eye(stereo, eye).raster_from_world(DVec3::ZERO) * point.extend(1.0);
+            (r.x / r.w, r.y / r.w)
+        };
+        let ray = middle.ray(200.5, 100.5);
+        let stereo = Stereo { interocular: 0.2, convergence: 4.0 };
+        for (z, disparity) in [(4.0, 0.0), (2.0, -1.0), (8.0, 0.5), (1e9, 1.0)] {
+            let point = ray.origin + ray.direction * z;
+            let ((left, row), (right, right_row)) =
+                (place(StereoEye::Left, point, stereo), place(StereoEye::Right, point, stereo));
+            // At twice the convergence, half of what is infinitely far away.
+            let far = 640.0 * 0.2 / (2.0 * middle.half_extent().x * 4.0);
+            assert!((right - left - disparity * far).abs() < 1e-5, "{z}: {left} {right}");
+            assert!((row - 100.5).abs() < 1e-9 && (right_row - 100.5).abs() < 1e-9);
+        }
+        let parallel = Stereo { convergence: f64::INFINITY, ..stereo };
+        assert_eq!(middle.of_eye(parallel, StereoEye::Left).lens, middle.lens);
     }
 
     #[test]

@@ -4,6 +4,7 @@
 
 mod path;
 mod resolve;
+mod stereo;
 
 pub use crate::frame::Quality;
 pub use path::camera_path;
@@ -11,11 +12,12 @@ pub use path::camera_path;
 use crate::accel::Accel;
 use crate::error::{Error, Result};
 use crate::frame::{
-    Aov, AovSet, Frame, FrameKind, FrameStats, PixelClass, RayCounts, StageSeconds, SurfaceSample, Window,
+    Aov, AovSet, Frame, FrameId, FrameKind, FrameStats, PixelClass, RayCounts, StageSeconds, StereoEye,
+    SurfaceSample, Window,
 };
-use crate::infer::{BuzzBuffer, CastCentres, CastRays, Inference, Projector, Trust};
+use crate::infer::{BuzzBuffer, CastCentres, CastRays, Inference, Move, Projector, Trust};
 use crate::plan::{Plan, Segment};
-use crate::scene::{Pose, Scene, View};
+use crate::scene::{Pose, Scene, Stereo, View};
 use crate::trace::{TraceOptions, Tracer};
 use glam::DVec3;
 use resolve::{MatteNames, Neighbour, Resolver, count_hidden, empty_frame};
@@ -31,7 +33,7 @@ pub trait FrameSink {
     fn put(&mut self, frame: Frame) -> Result<()>;
 
     /// Waits until all frames are written. Returns the seconds that each frame's encoding and writing took.
-    fn finish(&mut self) -> Result<Vec<(i64, StageSeconds)>>;
+    fn finish(&mut self) -> Result<Vec<(FrameId, StageSeconds)>>;
 }
 
 /// How to render a sequence.
@@ -61,6 +63,8 @@ pub struct Settings {
     pub audit: bool,
     /// The camera to use throughout, instead of the scene's cuts.
     pub camera: Option<usize>,
+    /// Render a pair of eyes about each camera, instead of what it sees itself. The cameras must be perspective.
+    pub stereo: Option<Stereo>,
     /// Cast each camera ray at random inside its pixel, by this seed, instead of through the centre. A full trace made so
     /// has the half-pixel guarantee's own error: what inferred frames are measured against.
     pub jitter: Option<u64>,
@@ -82,6 +86,7 @@ impl Settings {
             ambient_samples: 0,
             audit: false,
             camera: None,
+            stereo: None,
             jitter: None,
         }
     }
@@ -95,8 +100,8 @@ impl Settings {
 
 /// Told what happens, and asked whether to go on: by all threads, at every row of pixels.
 pub trait Observer: Sync {
-    /// A frame is finished; if it was `wanted` it has been given to the sink, otherwise others hang on it.
-    fn frame_done(&mut self, number: i64, kind: FrameKind, stats: &FrameStats, wanted: bool);
+    /// A frame, of one eye in stereo, is finished; if it was `wanted` it has been given to the sink, otherwise others hang on it.
+    fn frame_done(&mut self, frame: FrameId, kind: FrameKind, stats: &FrameStats, wanted: bool);
 
     /// The signal by which the user asked to stop, if so; once there is one, there is always one.
     fn stop_requested(&self) -> Option<i32> {
@@ -109,7 +114,7 @@ pub trait Observer: Sync {
 pub struct Unwatched;
 
 impl Observer for Unwatched {
-    fn frame_done(&mut self, _: i64, _: FrameKind, _: &FrameStats, _: bool) {}
+    fn frame_done(&mut self, _: FrameId, _: FrameKind, _: &FrameStats, _: bool) {}
 }
 
 /// An error if the user asked to stop.
@@ -158,8 +163,11 @@ pub fn render_sequence(
     Ok(())
 }
 
-/// How many [`BuzzBuffer`]s [`render_sequence`] holds: the key frame's, the neighbour's and the frame's own.
-pub const RENDER_BUFFERS: usize = 3;
+/// How many [`BuzzBuffer`]s [`render_sequence`] holds: the key frame's, the neighbour's and the frame's own, and the right
+/// eye's in stereo.
+pub fn render_buffers(settings: &Settings) -> usize {
+    if settings.stereo.is_some() { 4 } else { 3 }
+}
 
 /// What inference needs between frames; swapped, never made anew.
 #[derive(Default)]
@@ -167,13 +175,16 @@ struct Buffers {
     key: BuzzBuffer,
     old: BuzzBuffer,
     new: BuzzBuffer,
+    /// The right eye's, in stereo.
+    right: BuzzBuffer,
     inference: Inference,
 }
 
 impl Buffers {
-    fn fit(&mut self, window: Window, lit_words: usize) {
-        let (width, height) = (window.width as usize, window.height as usize);
-        for buffer in [&mut self.key, &mut self.old, &mut self.new] {
+    fn fit(&mut self, settings: &Settings, lit_words: usize) {
+        let (width, height) = (settings.window.width as usize, settings.window.height as usize);
+        let all = [&mut self.key, &mut self.old, &mut self.new, &mut self.right];
+        for buffer in all.into_iter().take(render_buffers(settings)) {
             if (buffer.width(), buffer.height(), buffer.lit_words()) != (width, height, lit_words) {
                 *buffer = BuzzBuffer::new(width, height, lit_words);
             }
@@ -199,20 +210,16 @@ fn render_segment(
     accel.place(scene, &pose, origin);
     let accel = &*accel;
     let tracer = Tracer::new(scene, accel, &pose, settings.trace_options());
-    buffers.fit(settings.window, tracer.lit_words());
+    buffers.fit(settings, tracer.lit_words());
     let names = settings.aovs.contains(Aov::Crypto).then(|| MatteNames::of(scene));
     let mut emitter =
         Emitter { scene, settings, accel, tracer: &tracer, origin, cuts, wanted, names, sink, observer };
-    let Buffers { key, old, new, inference } = buffers;
+    let Buffers { key, old, new, right, inference } = buffers;
 
     let key_shot = shot(scene, settings, segment.key);
-    let start = Instant::now();
-    key.forget(PixelClass::Traced);
-    let rays = key
-        .cast_unknown(&Projector::new(&key_shot.view, origin), &emitter.caster(&key_shot.view, segment.key));
-    let mut stats = FrameStats { rays, ..FrameStats::default() };
-    stats.seconds.trace = start.elapsed().as_secs_f64();
+    let stats = emitter.trace(segment.key, &key_shot, key);
     emitter.emit(segment.key, FrameKind::Traced, &key_shot, key, stats)?;
+    emitter.emit_right(segment.key, (key, &key_shot), right, inference)?;
 
     // Outward, as far as a wanted frame lies.
     let before = wanted.first().copied().unwrap_or(segment.key)..segment.key;
@@ -222,20 +229,9 @@ fn render_segment(
         for (i, &number) in frames.iter().enumerate() {
             let to = shot(scene, settings, number);
             let source = if i == 0 { &*key } else { &*old };
-            let start = Instant::now();
-            let caster = emitter.caster(&to.view, number);
-            let (source, target) = ((source, &from.view), (&mut *new, &to.view));
-            let cost = match settings.quality {
-                Quality::Full | Quality::HalfPixel => inference.infer(source, target, origin, &caster),
-                Quality::Centred => {
-                    inference.infer_centred(source, target, origin, Trust::Neighbours, &caster)
-                }
-                Quality::Verified => inference.infer_centred(source, target, origin, Trust::Proof, &caster),
-            };
-            let mut stats = FrameStats { rays: cost.rays, ..FrameStats::default() };
-            stats.seconds.trace = cost.tracing.as_secs_f64();
-            stats.seconds.infer = start.elapsed().as_secs_f64() - stats.seconds.trace;
+            let stats = emitter.infer(number, Move::Camera, (source, &from), (new, &to), inference);
             emitter.emit(number, segment.kind(number), &to, new, stats)?;
+            emitter.emit_right(number, (new, &to), right, inference)?;
             std::mem::swap(old, new);
             from = to;
         }
@@ -243,19 +239,28 @@ fn render_segment(
     Ok(())
 }
 
-/// The camera at a frame: the rendered window as a view of its own, and the whole image.
+/// The camera at a frame, or an eye about it: the rendered window as a view of its own, and the whole image.
 struct Shot {
     camera: usize,
+    eye: Option<StereoEye>,
     view: View,
     full_view: View,
     pose: Pose,
 }
 
+/// What is carried from frame to frame: in stereo, the left eye.
 fn shot(scene: &Scene, settings: &Settings, frame: i64) -> Shot {
+    let eye = settings.stereo.map(|_| StereoEye::Left);
+    shot_of(eye, scene, settings, frame)
+}
+
+fn shot_of(eye: Option<StereoEye>, scene: &Scene, settings: &Settings, frame: i64) -> Shot {
     let pose = scene.pose(scene.timing.time_of(frame));
     let camera = scene.camera_at(frame, settings.camera);
-    let full_view = scene.view(&pose, camera, settings.width, settings.height);
-    Shot { camera, view: full_view.cropped(settings.window), full_view, pose }
+    let middle = scene.view(&pose, camera, settings.width, settings.height);
+    let of_eye = |stereo, eye| middle.of_eye(stereo, eye);
+    let full_view = settings.stereo.zip(eye).map_or(middle, |(stereo, eye)| of_eye(stereo, eye));
+    Shot { camera, eye, view: full_view.cropped(settings.window), full_view, pose }
 }
 
 /// The tracer as inference wants it.
@@ -337,6 +342,42 @@ impl Emitter<'_> {
         Caster { tracer: self.tracer, view, observer: &*self.observer, jitter }
     }
 
+    /// Casts a ray through every pixel.
+    fn trace(&self, number: i64, shot: &Shot, buffer: &mut BuzzBuffer) -> FrameStats {
+        let start = Instant::now();
+        buffer.forget(PixelClass::Traced);
+        let projector = Projector::new(&shot.view, self.origin);
+        let rays = buffer.cast_unknown(&projector, &self.caster(&shot.view, number));
+        let mut stats = FrameStats { rays, ..FrameStats::default() };
+        stats.seconds.trace = start.elapsed().as_secs_f64();
+        stats
+    }
+
+    /// Infers one view from another, as exactly as the quality asks.
+    fn infer(
+        &self,
+        number: i64,
+        by: Move,
+        (old, from): (&BuzzBuffer, &Shot),
+        (new, to): (&mut BuzzBuffer, &Shot),
+        inference: &mut Inference,
+    ) -> FrameStats {
+        let start = Instant::now();
+        let (caster, origin) = (self.caster(&to.view, number), self.origin);
+        let (source, target) = ((old, &from.view), (new, &to.view));
+        let cost = match self.settings.quality {
+            Quality::Full | Quality::HalfPixel => inference.infer(by, source, target, origin, &caster),
+            Quality::Centred => {
+                inference.infer_centred(by, source, target, origin, Trust::Neighbours, &caster)
+            }
+            Quality::Verified => inference.infer_centred(by, source, target, origin, Trust::Proof, &caster),
+        };
+        let mut stats = FrameStats { rays: cost.rays, ..FrameStats::default() };
+        stats.seconds.trace = cost.tracing.as_secs_f64();
+        stats.seconds.infer = start.elapsed().as_secs_f64() - stats.seconds.trace;
+        stats
+    }
+
     /// Finishes a frame, unless the user asked to stop: then its samples may be missing, and it is dropped.
     fn emit(
         &mut self,
@@ -352,6 +393,7 @@ impl Emitter<'_> {
             stats.pixels = buffer.count_classes();
             let mut frame = self.sink.blank().unwrap_or_else(|| empty_frame(shot.full_view));
             frame.number = number;
+            frame.eye = shot.eye;
             frame.kind = kind;
             frame.view = shot.full_view;
             frame.camera.clone_from(&self.scene.cameras[shot.camera].name);
@@ -375,7 +417,8 @@ impl Emitter<'_> {
             frame.stats = stats;
             self.sink.put(frame)?;
         }
-        self.observer.frame_done(number, kind, &stats, self.wanted.contains(&number));
+        let id = FrameId { number, eye: shot.eye };
+        self.observer.frame_done(id, kind, &stats, self.wanted.contains(&number));
         go_on(self.observer)
     }
 
@@ -384,7 +427,7 @@ impl Emitter<'_> {
         let timing = &self.scene.timing;
         let wanted = self.settings.aovs.contains(Aov::Motion) && !is_cut;
         let inside = (timing.first..=timing.last).contains(&number);
-        let other = (wanted && inside).then(|| self::shot(self.scene, self.settings, number));
+        let other = (wanted && inside).then(|| shot_of(shot.eye, self.scene, self.settings, number));
         other.filter(|o| o.camera == shot.camera).map(|o| {
             let moved = !self.scene.looks_alike(&shot.pose, &o.pose);
             Neighbour { view: o.view, surfaces: moved.then(|| self.accel.displaced(self.scene, &o.pose)) }

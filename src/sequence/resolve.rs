@@ -240,6 +240,7 @@ pub(super) fn count_hidden(
 pub(super) fn empty_frame(view: View) -> Frame {
     Frame {
         number: 0,
+        eye: None,
         kind: FrameKind::Traced,
         view,
         camera: String::new(),

@@ -3,7 +3,7 @@
 use crate::rig::view;
 use PixelClass::{Bad, Creeping, Entering, Good, Missed, Overlapped};
 use buzz::frame::{PackedNormal, PixelClass, RayCounts, SurfaceRef, SurfaceSample};
-use buzz::infer::{BuzzBuffer, CastRays, Inference, Projector};
+use buzz::infer::{BuzzBuffer, CastRays, Inference, Move, Projector};
 use buzz::scene::View;
 use glam::{DVec3, Vec3};
 
@@ -37,12 +37,17 @@ fn buffer(view: &View, samples: &[SurfaceSample]) -> BuzzBuffer {
     buffer
 }
 
-/// Infers five pixels; rays answer with object 99, far away.
+/// Infers five pixels after a camera move.
 fn infer(old: &[SurfaceSample], from: &View, to: &View) -> (BuzzBuffer, RayCounts) {
+    infer_by(Move::Camera, old, from, to)
+}
+
+/// Infers five pixels; rays answer with object 99, far away.
+fn infer_by(by: Move, old: &[SurfaceSample], from: &View, to: &View) -> (BuzzBuffer, RayCounts) {
     let old = buffer(from, old);
     let mut new = BuzzBuffer::new(5, 1, 1);
     let rays = Table((0..5).map(|i| point((f64::from(i) - 2.0) * 90.0 + to.eye.x, 90.0, 99)).collect());
-    let cost = Inference::default().infer((&old, from), (&mut new, to), DVec3::ZERO, &rays);
+    let cost = Inference::default().infer(by, (&old, from), (&mut new, to), DVec3::ZERO, &rays);
     (new, cost.rays)
 }
 
@@ -81,13 +86,19 @@ fn of_two_samples_on_a_pixel_the_nearest_wins_in_either_order() {
 
 /// A post at x = 0, depth 1, and the eye steps two units to the right. The post lands on pixel 0; the line L behind it
 /// appears at 2.5 - 2 / z, so in pixel 1 its depth runs from 4/3 to 4: int_z is 4.
+///
+/// The right eye of a pair, two units apart, sees the same as that step shows.
 fn behind_a_post(sample: SurfaceSample) -> (PixelClass, u32) {
     let mut row: Vec<_> = (0..5).map(|i| point((f64::from(i) - 2.0) * 10.0 + 2.0, 10.0, 1)).collect();
     row[1] = sample;
     row[2] = point(0.0, 1.0, 2);
-    let (new, _) = infer(&row, &five(0.0), &five(2.0));
-    assert_eq!(new.object[0], 2, "the post is where it should be");
-    (new.class[1], new.object[1])
+    let by = |by| {
+        let (new, _) = infer_by(by, &row, &five(0.0), &five(2.0));
+        assert_eq!(new.object[0], 2, "the post is where it should be");
+        (new.class[1], new.object[1])
+    };
+    assert_eq!(by(Move::Camera), by(Move::OtherEye));
+    by(Move::OtherEye)
 }
 
 #[test]

@@ -6,3 +6,4 @@ mod centred;
 mod five_pixels;
 mod half_pixel;
 mod rig;
+mod stereo;

@@ -1,7 +1,7 @@
 //! Scenes of spheres over a ground plane, under one light, whose answers a closed form knows.
 
 use buzz::frame::{PackedNormal, PixelClass, RayCounts, SurfaceRef, SurfaceSample};
-use buzz::infer::{BuzzBuffer, CastCentres, CastRays, Inference, Projector, Trust};
+use buzz::infer::{BuzzBuffer, CastCentres, CastRays, Inference, Move, Projector, Trust};
 use buzz::scene::{Lens, Projection, View};
 use glam::{DMat3, DVec2, DVec3};
 use proptest::prelude::*;
@@ -202,8 +202,8 @@ pub fn chain(
         let to = camera(step * i as f64, turn * i as f64);
         let (source, target, rays) = ((&old, &from), (&mut new, &to), Eye(scene, &to));
         let cost = match trust {
-            None => inference.infer(source, target, DVec3::ZERO, &rays),
-            Some(trust) => inference.infer_centred(source, target, DVec3::ZERO, trust, &rays),
+            None => inference.infer(Move::Camera, source, target, DVec3::ZERO, &rays),
+            Some(trust) => inference.infer_centred(Move::Camera, source, target, DVec3::ZERO, trust, &rays),
         };
         check(&to, &new, cost.rays)?;
         std::mem::swap(&mut old, &mut new);

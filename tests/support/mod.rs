@@ -57,6 +57,7 @@ pub fn frame(number: i64, kind: FrameKind, shape: &Shape) -> Frame {
     class.iter().for_each(|&c| pixels[c as usize] += 1);
     Frame {
         number,
+        eye: None,
         kind,
         view: view(width, height),
         camera: "Caméra 1".into(),

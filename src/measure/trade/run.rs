@@ -2,7 +2,7 @@
 
 use super::{Candidate, ChainStep, Measured, MeasuredFrame, Summary, Trade, WorstPlace, distance, total};
 use crate::accel::Accel;
-use crate::frame::{Frame, FrameKind, FrameStats, PixelClass, StageSeconds};
+use crate::frame::{Frame, FrameId, FrameKind, FrameStats, PixelClass, StageSeconds};
 use crate::measure::{ENHANCED, Exposure, ImageError, Percentile, compare_pictures, picture, worst_place};
 use crate::output::NullSink;
 use crate::plan::Segment;
@@ -202,9 +202,9 @@ struct Recorder<'a> {
 }
 
 impl Observer for Recorder<'_> {
-    fn frame_done(&mut self, number: i64, kind: FrameKind, stats: &FrameStats, wanted: bool) {
+    fn frame_done(&mut self, frame: FrameId, kind: FrameKind, stats: &FrameStats, wanted: bool) {
         if wanted {
-            let take = self.takes.entry(number).or_insert(Take { kind, stats: *stats, seconds: Vec::new() });
+            let take = self.takes.entry(frame.number).or_insert(Take { kind, stats: *stats, seconds: Vec::new() });
             take.stats = *stats;
             take.seconds.push(stats.seconds);
         }
@@ -254,7 +254,7 @@ impl FrameSink for KeepTruth<'_> {
         Ok(())
     }
 
-    fn finish(&mut self) -> Result<Vec<(i64, StageSeconds)>> {
+    fn finish(&mut self) -> Result<Vec<(FrameId, StageSeconds)>> {
         Ok(Vec::new())
     }
 }
@@ -313,7 +313,7 @@ impl FrameSink for CheckSink<'_> {
         Ok(())
     }
 
-    fn finish(&mut self) -> Result<Vec<(i64, StageSeconds)>> {
+    fn finish(&mut self) -> Result<Vec<(FrameId, StageSeconds)>> {
         Ok(Vec::new())
     }
 }

@@ -1,7 +1,7 @@
 //! A report's charts: one bar a frame, so that they stand below each other.
 
 use super::{escaped, grouped, percent};
-use crate::frame::{PixelClass, RayCounts};
+use crate::frame::{PixelClass, RayCounts, StereoEye};
 use crate::output::report::{FrameReport, KeyFrame, Report};
 use serde_json::{Map, Value};
 use std::collections::HashSet;
@@ -84,13 +84,14 @@ impl Report {
     /// What a frame is, in words.
     pub(super) fn describe(&self, frame: &FrameReport) -> String {
         let made = match frame.from {
+            Some(_) if frame.eye == Some(StereoEye::Right) => "inferred from left".into(),
             Some(from) => format!("inferred from {from}"),
             None => match self.plan.keyframes.iter().find(|key| key.frame == frame.frame) {
                 Some(key) => format!("key frame ({})", key.reason),
                 None => "traced".into(),
             },
         };
-        format!("Frame {}: {made}{}", frame.frame, if frame.skipped { ", was there already" } else { "" })
+        format!("Frame {}: {made}{}", frame.id(), if frame.skipped { ", was there already" } else { "" })
     }
 
     fn classes(&self) -> String {
@@ -103,7 +104,7 @@ impl Report {
                 let height = HEIGHT * pixels as f64 / total.max(1) as f64;
                 y -= height;
                 if pixels > 0 {
-                    let text = format!("Frame {}: {} {}", frame.frame, class.name(), percent(pixels, total));
+                    let text = format!("Frame {}: {} {}", frame.id(), class.name(), percent(pixels, total));
                     bars += &self.bar(i, y, height, &format!("fill=\"{}\"", COLORS[class as usize]), &text);
                 }
             }

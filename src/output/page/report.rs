@@ -166,7 +166,7 @@ impl Report {
             .map(|frame| {
                 let ms = (frame.seconds.infer + frame.seconds.trace + frame.seconds.enhance) * 1e3;
                 let mut row =
-                    vec![frame.frame.to_string(), frame.from.map_or("key".into(), |from| from.to_string())];
+                    vec![frame.id().to_string(), frame.from.map_or("key".into(), |from| from.to_string())];
                 row.extend(STACK.iter().map(|&class| grouped(count(&frame.pixels, class))));
                 row.extend([grouped(frame.rays.total()), format!("{ms:.1}")]);
                 row
@@ -184,11 +184,11 @@ mod tests {
 
     #[test]
     fn the_page_stands_alone_and_escapes_names() {
-        let record = |number, kind| {
+        let record = |number: i64, kind| {
             let mut stats = FrameStats::default();
             stats.pixels[1] = 750;
             stats.pixels[3] = 250;
-            FrameRecord { number, kind, stats, skipped: number == 2 }
+            FrameRecord { id: number.into(), kind, stats, skipped: number == 2 }
         };
         let mut input = ReportInput { input: "<a & \"b\">.gltf".into(), ..ReportInput::default() };
         input.frames = vec![record(1, FrameKind::Traced), record(2, FrameKind::Inferred { from: 1 })];
