@@ -16,6 +16,7 @@ mod intersect;
 mod opacity;
 mod tree;
 mod triangle;
+mod turned;
 mod wide;
 
 use crate::frame::SurfaceRef;

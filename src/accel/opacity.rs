@@ -24,11 +24,16 @@ const MIN_ALPHA: f32 = 1.0 / 255.0;
 /// From this opacity on a surface casts a shadow.
 const SHADOW_OPACITY: f32 = 0.5;
 
+/// True if the eye looks through a surface's back.
+pub(super) fn culls_back(material: &Material) -> bool {
+    !material.double_sided && material.transmission == 0.0
+}
+
 /// The flags of triangles of `mesh`.
 pub(super) fn flags(scene: &Scene, mesh: &Mesh) -> u32 {
     let material = &scene.materials[mesh.material];
     let mut flags = 0;
-    if !material.double_sided && material.transmission == 0.0 {
+    if culls_back(material) {
         flags |= CULL_BACK;
     }
     let uniform_alpha = material.alpha_mode == AlphaMode::Opaque

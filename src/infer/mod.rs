@@ -27,6 +27,7 @@ mod obscured;
 mod project;
 mod shadow_edges;
 mod stereo;
+mod turned;
 
 pub use around::Trust;
 pub use buzz_buffer::{BuzzBuffer, CastRays, Projected, Projector, UNKNOWN};
@@ -36,6 +37,7 @@ pub use entering::entering;
 pub use obscured::obscured;
 pub use project::{Landings, gather, project};
 pub use stereo::{Parallax, other_eye};
+pub use turned::turned;
 
 use crate::frame::{PixelClass, RayCounts};
 use crate::scene::View;
@@ -92,7 +94,7 @@ impl Inference {
     ) -> Cost {
         let to = Projector::new(new_view, origin);
         let mut cost = Cost::default();
-        self.reproject(by, old, old_view, new_view, origin);
+        self.reproject(by, old, old_view, new_view, origin, rays);
         gather(old, &self.landings, &self.marks, new);
 
         // Ray-cast the positions that nothing explains, then the gaps that opened inside objects.
@@ -117,7 +119,7 @@ impl Inference {
     ) -> Cost {
         let to = Projector::new(new_view, origin);
         let mut cost = Cost::default();
-        self.reproject(by, old, old_view, new_view, origin);
+        self.reproject(by, old, old_view, new_view, origin, rays);
 
         // Centre what lies within surfaces; cast rays at edges, at what nothing explains, and along shadows' edges.
         self.centring.recentre(old, (&self.landings, &self.marks), &to, rays, trust, new);
@@ -126,7 +128,15 @@ impl Inference {
     }
 
     /// Finds which old sample each new pixel shows, and where that is not to be believed.
-    fn reproject(&mut self, by: Move, old: &BuzzBuffer, old_view: &View, new_view: &View, origin: DVec3) {
+    fn reproject(
+        &mut self,
+        by: Move,
+        old: &BuzzBuffer,
+        old_view: &View,
+        new_view: &View,
+        origin: DVec3,
+        rays: &impl CastRays,
+    ) {
         let (landings, marks) = (&mut self.landings, &mut self.marks);
         let (from, to) = (Projector::new(old_view, origin), Projector::new(new_view, origin));
 
@@ -145,6 +155,9 @@ impl Inference {
             // Both at once, along the scan-lines.
             Move::OtherEye => other_eye(old, &Parallax::between(old_view, new_view, origin), landings, marks),
         };
+
+        // Clear what a surface that opens to the eye stands before (not in the paper, whose objects are solid).
+        turned(&rays.turned(old_view), &to, landings, marks);
 
         // Clear the contested area, where new objects may come in: k is the nearest that is known.
         if let Some(k) = nearest {

@@ -19,7 +19,7 @@ use crate::infer::{BuzzBuffer, CastCentres, CastRays, Inference, Move, Projector
 use crate::plan::{Plan, Segment};
 use crate::scene::{Pose, Scene, Stereo, View};
 use crate::trace::{TraceOptions, Tracer};
-use glam::DVec3;
+use glam::{DVec3, Vec3};
 use resolve::{MatteNames, Neighbour, Resolver, count_hidden, empty_frame};
 use std::collections::BTreeSet;
 use std::time::Instant;
@@ -273,6 +273,10 @@ struct Caster<'a> {
 }
 
 impl CastRays for Caster<'_> {
+    fn turned(&self, old: &View) -> Vec<[Vec3; 3]> {
+        self.tracer.turned(old, self.view)
+    }
+
     fn is_cancelled(&self) -> bool {
         self.observer.stop_requested().is_some()
     }

@@ -175,6 +175,11 @@ impl<'a> Tracer<'a> {
         nearest
     }
 
+    /// The triangles that open to the eye between two views; see [`Accel::turned`].
+    pub fn turned(&self, old: &View, new: &View) -> Vec<[Vec3; 3]> {
+        self.accel.turned(self.scene, old, new)
+    }
+
     /// The first thing on the ray through raster position (x, y): a surface's sample and the point it lies on, or the
     /// background's.
     fn first_hit(

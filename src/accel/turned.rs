@@ -1,0 +1,56 @@
+//! Surfaces that open to the eye between two views.
+
+use super::{Accel, opacity};
+use crate::scene::{Scene, View};
+use glam::{DVec3, Vec3, Vec3A};
+use rayon::prelude::*;
+
+/// Triangles that one task looks at.
+const CHUNK: usize = 8192;
+
+impl Accel {
+    /// The corners, relative to the origin, of every triangle whose plane the eye crosses between two views to look at a
+    /// visible side, or from which it moves away by as much as it was before it at first: the old view showed it as a
+    /// line, or through its culled back not at all.
+    pub fn turned(&self, scene: &Scene, old: &View, new: &View) -> Vec<[Vec3; 3]> {
+        let eyes = [old, new].map(|view| self.eye_of(view));
+        let of_instance = |index: usize| {
+            let instance = &scene.instances[index];
+            let placement = self.placement(index);
+            let mesh = &scene.meshes[instance.mesh];
+            let culled = opacity::culls_back(&scene.materials[mesh.material]);
+            let object_from_render = placement.render_from_object.inverse();
+            let [old, new] = eyes.map(|(at, w)| {
+                let at = if w > 0.0 {
+                    object_from_render.transform_point3a(at)
+                } else {
+                    object_from_render.transform_vector3a(at)
+                };
+                (at, w)
+            });
+            let positions = self.positions(index, mesh);
+            let opens = move |triangle: &[u32; 3]| {
+                let [a, b, c] = triangle.map(|i| Vec3A::from(positions[i as usize]));
+                let normal = (b - a).cross(c - a) * placement.winding;
+                let before = |(at, w): (Vec3A, f32)| normal.dot(at - a * w);
+                let (was, is) = (before(old), before(new));
+                let side = if culled { 1.0 } else { is.signum() };
+                (is * side > 0.0 && was * side <= 0.5 * is * side).then(|| {
+                    [a, b, c].map(|p| placement.render_from_object.transform_point3a(p).into())
+                })
+            };
+            let present: &[[u32; 3]] = if placement.present { &mesh.triangles } else { &[] };
+            present.par_chunks(CHUNK).flat_map_iter(move |chunk| chunk.iter().filter_map(opens))
+        };
+        (0..scene.instances.len()).into_par_iter().flat_map(of_instance).collect()
+    }
+
+    /// The eye of a view, or the direction towards it for parallel rays (weight 0).
+    fn eye_of(&self, view: &View) -> (Vec3A, f32) {
+        if view.is_perspective() {
+            ((view.eye - self.origin).as_vec3a(), 1.0)
+        } else {
+            ((DVec3::ZERO - view.forward).as_vec3a(), 0.0)
+        }
+    }
+}
