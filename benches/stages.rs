@@ -9,7 +9,8 @@ use buzz::accel::Accel;
 use buzz::frame::{Aov, AovSet, Frame, PixelClass, RayCounts, SurfaceSample};
 use buzz::import::{ImportOptions, import};
 use buzz::infer::{
-    Along, BuzzBuffer, CastRays, Inference, Landings, Marks, Move, Projector, creeping, gather, obscured, project,
+    Along, BuzzBuffer, CastRays, Inference, Landings, Marks, Move, Projector, creeping, gather, obscured,
+    project,
 };
 use buzz::output::exr::encode;
 use buzz::output::{Compression, FileOptions, MemorySink, SettingsHasher};
@@ -82,7 +83,9 @@ fn stages(c: &mut Criterion) {
     });
     group.bench_function("infer", |b| {
         let mut inference = Inference::default();
-        b.iter(|| inference.infer(Move::Camera, (&old, &from), (&mut new, &to), origin, &Caster(&tracer, &to)));
+        b.iter(|| {
+            inference.infer(Move::Camera, (&old, &from), (&mut new, &to), origin, &Caster(&tracer, &to))
+        });
     });
     let mut sink = MemorySink::default();
     let frame = rendered(&scene, &mut sink);

@@ -17,7 +17,11 @@ use support::{Shape, default_layers, frame, hash, options};
 
 fn sink(folder: &Path, frames: impl IntoIterator<Item = i64>, compression: Compression) -> ExrSink {
     let names = NamePattern::parse("<stem>.%04d.exr", "test").unwrap();
-    ExrSink::new(OutputFolder::open(folder, names, frames.into_iter().map(Into::into)).unwrap(), options(compression)).unwrap()
+    ExrSink::new(
+        OutputFolder::open(folder, names, frames.into_iter().map(Into::into)).unwrap(),
+        options(compression),
+    )
+    .unwrap()
 }
 
 fn bytes_of(frame: &Frame, compression: Compression) -> Vec<u8> {

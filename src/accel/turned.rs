@@ -35,9 +35,8 @@ impl Accel {
                 let before = |(at, w): (Vec3A, f32)| normal.dot(at - a * w);
                 let (was, is) = (before(old), before(new));
                 let side = if culled { 1.0 } else { is.signum() };
-                (is * side > 0.0 && was * side <= 0.5 * is * side).then(|| {
-                    [a, b, c].map(|p| placement.render_from_object.transform_point3a(p).into())
-                })
+                (is * side > 0.0 && was * side <= 0.5 * is * side)
+                    .then(|| [a, b, c].map(|p| placement.render_from_object.transform_point3a(p).into()))
             };
             let present: &[[u32; 3]] = if placement.present { &mesh.triangles } else { &[] };
             present.par_chunks(CHUNK).flat_map_iter(move |chunk| chunk.iter().filter_map(opens))

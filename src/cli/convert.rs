@@ -131,7 +131,8 @@ pub fn run(args: ConvertArgs) -> Result<ExitCode> {
     report.write_html(&report_path.with_extension("html"), &thumbnails.encoded())?;
     // Of a pair, the left eye is looked at.
     let names = sink.folder().names();
-    let review_names = if job.settings.stereo.is_some() { names.of_eye(StereoEye::Left) } else { names.clone() };
+    let review_names =
+        if job.settings.stereo.is_some() { names.of_eye(StereoEye::Left) } else { names.clone() };
     let review = Review {
         folder: out_dir,
         names: &review_names,
@@ -204,8 +205,9 @@ fn refuse_parallel(scene: &Scene, settings: &Settings) -> Result<()> {
     match cameras.iter().find(parallel) {
         Some(&c) => {
             let name = &scene.cameras[c].name;
-            let message =
-                format!("--stereo: camera {name} is orthographic, and has no parallax; choose another by --camera");
+            let message = format!(
+                "--stereo: camera {name} is orthographic, and has no parallax; choose another by --camera"
+            );
             Err(Error::Usage(message).into())
         }
         None => Ok(()),

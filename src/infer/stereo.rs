@@ -52,12 +52,7 @@ impl Parallax {
 
 /// Lands the left eye's samples in the right eye's view, the nearest on each pixel, and marks what a gap between them
 /// uncovers. Returns the least depth of all.
-pub fn other_eye(
-    left: &BuzzBuffer,
-    parallax: &Parallax,
-    landings: &Landings,
-    marks: &Marks,
-) -> Option<f32> {
+pub fn other_eye(left: &BuzzBuffer, parallax: &Parallax, landings: &Landings, marks: &Marks) -> Option<f32> {
     let scan_line = |y: usize| {
         let row = y * left.width()..(y + 1) * left.width();
         let mut nearest = f32::INFINITY;
@@ -86,14 +81,7 @@ pub fn other_eye(
 
 /// Marks what shows in the gap between sample `i` and its right neighbour, as far as something that `i` hid from the left
 /// eye may stand before it.
-fn clear_gap(
-    left: &BuzzBuffer,
-    i: usize,
-    y: usize,
-    parallax: &Parallax,
-    landings: &Landings,
-    marks: &Marks,
-) {
+fn clear_gap(left: &BuzzBuffer, i: usize, y: usize, parallax: &Parallax, landings: &Landings, marks: &Marks) {
     let begin = parallax.column(left, i, left.z[i]);
     let end = parallax.column(left, i + 1, left.z[i + 1]);
     let farthest = parallax.column(left, i, f32::INFINITY);

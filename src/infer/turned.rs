@@ -13,7 +13,8 @@ use glam::{Vec3, Vec4};
 /// Marks the pixels on which the triangles (relative to the view's origin) stand before what landed there.
 pub fn turned(triangles: &[[Vec3; 3]], view: &Projector, landings: &Landings, marks: &Marks) {
     for triangle in triangles {
-        let corners = before_the_eye(triangle.map(|p| *view.raster_from_world() * p.extend(1.0)), view.near());
+        let corners =
+            before_the_eye(triangle.map(|p| *view.raster_from_world() * p.extend(1.0)), view.near());
         let Some(nearest) = corners.iter().map(|c| c.z).reduce(f32::min) else { continue };
         let outline: Vec<(f32, f32)> = corners.iter().map(|c| (c.x / c.w, c.y / c.w)).collect();
         for_each_pixel(&outline, view.size(), |x, y| {
@@ -55,9 +56,8 @@ fn for_each_pixel(outline: &[(f32, f32)], (width, height): (f32, f32), mut visit
                 continue;
             }
             // The part of the side that lies in the row.
-            let at = |row: f32| {
-                low.0 + (high.0 - low.0) * ((row.clamp(low.1, high.1) - low.1) / (high.1 - low.1))
-            };
+            let at =
+                |row: f32| low.0 + (high.0 - low.0) * ((row.clamp(low.1, high.1) - low.1) / (high.1 - low.1));
             let ends = if high.1 > low.1 { [at(y), at(y + 1.0)] } else { [low.0, high.0] };
             for x in ends {
                 (from, to) = (from.min(x), to.max(x));

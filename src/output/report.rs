@@ -385,7 +385,8 @@ mod tests {
     }
 
     fn report() -> Report {
-        let record = |number: i64, kind, stats| FrameRecord { id: number.into(), kind, stats, skipped: false };
+        let record =
+            |number: i64, kind, stats| FrameRecord { id: number.into(), kind, stats, skipped: false };
         Report::new(ReportInput {
             input: "anim.gltf".into(),
             settings: Settings { quality: "half-pixel".into(), fps: [24_000, 1001], ..Settings::default() },

@@ -162,7 +162,10 @@ impl FrameSink for ExrSink {
                     // The writer lives as long as the sink, and the sink waits for every frame in flight.
                     if encoded.send(Job { id, path, file, seconds }).is_err() {
                         shared.land(|s| {
-                            s.fail(Error::Frame { frame: id.number, message: "the writer has stopped".into() })
+                            s.fail(Error::Frame {
+                                frame: id.number,
+                                message: "the writer has stopped".into(),
+                            })
                         });
                     }
                 }

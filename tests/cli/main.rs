@@ -14,5 +14,6 @@ mod resume;
 mod rig;
 mod soft;
 mod stage;
+mod stereo;
 mod trade;
 mod whole;

@@ -204,7 +204,8 @@ struct Recorder<'a> {
 impl Observer for Recorder<'_> {
     fn frame_done(&mut self, frame: FrameId, kind: FrameKind, stats: &FrameStats, wanted: bool) {
         if wanted {
-            let take = self.takes.entry(frame.number).or_insert(Take { kind, stats: *stats, seconds: Vec::new() });
+            let take =
+                self.takes.entry(frame.number).or_insert(Take { kind, stats: *stats, seconds: Vec::new() });
             take.stats = *stats;
             take.seconds.push(stats.seconds);
         }

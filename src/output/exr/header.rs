@@ -96,6 +96,9 @@ fn attributes(
     if !frame.camera.is_empty() {
         all.push(("cameraLabel", text(&frame.camera)));
     }
+    if let Some(eye) = frame.eye {
+        all.push(("view", text(eye.name())));
+    }
     let sensor = sensor(view);
     all.push(("sensorOverallDimensions", A::FloatVec2(Vec2(sensor.0 as f32, sensor.1 as f32))));
     if let Projection::Perspective { yfov } = view.lens.projection {
