@@ -16,4 +16,5 @@ mod soft;
 mod stage;
 mod stereo;
 mod trade;
+mod turned;
 mod whole;
