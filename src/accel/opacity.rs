@@ -3,7 +3,7 @@
 //! A material that is the same everywhere is decided once, so that only rays that meet a surface whose alpha or
 //! transmission comes from a texture pay for a lookup.
 
-use crate::scene::{AlphaMode, Material, Mesh, Scene};
+use crate::scene::{AlphaMode, Material, Mesh, Scene, Shape};
 use glam::Vec2;
 
 /// Back faces are not there for rays from the eye.
@@ -24,11 +24,12 @@ const MIN_ALPHA: f32 = 1.0 / 255.0;
 /// From this opacity on a surface casts a shadow.
 const SHADOW_OPACITY: f32 = 0.5;
 
-/// The flags of triangles of `mesh`.
+/// The flags of triangles of `mesh`, or of its shape.
 pub(super) fn flags(scene: &Scene, mesh: &Mesh) -> u32 {
     let material = &scene.materials[mesh.material];
     let mut flags = 0;
-    if !material.double_sided && material.transmission == 0.0 {
+    let double_sided = material.double_sided || mesh.shape.as_ref().is_some_and(Shape::is_double_sided);
+    if !double_sided && material.transmission == 0.0 {
         flags |= CULL_BACK;
     }
     let uniform_alpha = material.alpha_mode == AlphaMode::Opaque
