@@ -9,9 +9,9 @@ The sky is a polygon too, and must not come between the light and the city. It l
 ground far ahead, over the city, to high behind the camera. The sun stands behind the camera, lower than that, and so
 shines in under it. The sky is unlit: it receives no shadow and no highlight, as in the paper.
 
-A polygon is one flat face, whatever number of triangles glTF makes of it; a quadric is a true one, with a mesh beside it
-for readers that know none. Each building and each quadric is a node, so
-that it has an object tag of its own; `extras` on the node give its polygons, and whether it reflects and refracts.
+A polygon is one flat face, whatever number of triangles glTF makes of it; a quadric is a true one, with a mesh beside
+it for readers that know none. Each building and each quadric is a node, so that it has an object tag of its own;
+`extras` on the node give its polygons, and whether it reflects and refracts.
 """
 
 from dataclasses import dataclass

@@ -211,6 +211,17 @@ mod tests {
             // A ray that only touches an edge may meet the two faces there within the step.
             prop_assert!(crossings == expected || t < 1.0 + 2e-9 && crossings.len() == 1, "{crossings:?}");
         }
+
+        /// No rounding cuts a hole in what has none.
+        #[test]
+        fn an_endless_plane_has_no_holes(from in direction(), away in 0.1..1e4f64, aim in direction()) {
+            let origin = DVec3::new(from.x, from.y.abs() + 1e-6, from.z) * away;
+            let direction = DVec3::new(aim.x, -aim.y.abs() - 1e-4, aim.z);
+            let plane = Shape::plane(f64::INFINITY, f64::INFINITY, false);
+            let hit = plane.intersect(origin, direction, (0.0, f64::INFINITY), false);
+            let expected = origin.y / -direction.y;
+            prop_assert!(hit.is_some_and(|hit| (hit.t / expected - 1.0).abs() < 1e-9), "{hit:?} {expected}");
+        }
     }
 
     #[test]

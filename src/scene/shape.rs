@@ -55,11 +55,7 @@ impl Shape {
     pub fn cuboid(size: DVec3) -> Self {
         let half = size * 0.5;
         let sides = DVec3::AXES.into_iter().flat_map(|axis| [axis, -axis]);
-        let faces = sides.map(|normal| Face {
-            min: -half,
-            max: half,
-            ..Face::of(Quadric::plane(normal, normal.abs().dot(half)))
-        });
+        let faces = sides.map(|normal| flat(normal, half));
         Self::closed(faces.collect(), half)
     }
 
@@ -106,8 +102,7 @@ impl Shape {
     /// The plane y = 0 seen from +Y, `size_x` by `size_z` around the origin; either may be infinite.
     pub fn plane(size_x: f64, size_z: f64, double_sided: bool) -> Self {
         let half = DVec3::new(size_x, 0.0, size_z) * 0.5;
-        let face = Face { min: -half, max: half, ..Face::of(Quadric::plane(DVec3::Y, 0.0)) };
-        Self { double_sided, ..Self::closed(vec![face], half) }
+        Self { double_sided, ..Self::closed(vec![flat(DVec3::Y, half)], half) }
     }
 
     /// The part of a quadric inside a box.
@@ -145,6 +140,17 @@ impl Shape {
             face.radius += overlap;
         }
         self
+    }
+}
+
+/// The side of a box that looks along an axis. It has no bounds on that axis: rounding would cut holes.
+fn flat(normal: DVec3, half: DVec3) -> Face {
+    let across = normal.cmpeq(DVec3::ZERO);
+    let max = DVec3::select(across, half, DVec3::INFINITY);
+    Face {
+        min: -max,
+        max,
+        ..Face::of(Quadric::plane(normal, normal.abs().dot(DVec3::select(across, DVec3::ZERO, half))))
     }
 }
 
