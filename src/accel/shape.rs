@@ -187,7 +187,7 @@ mod tests {
         /// A closed shape is left as often as it is entered, also by rays through its edges.
         #[test]
         fn what_goes_in_comes_out(
-            size in (0.1..4.0f64, 0.0..4.0f64, 0.1..4.0f64), from in direction(), rim in 0.0..6.2832f64,
+            size in (0.1..4.0f64, 0.0..4.0f64, 0.1..4.0f64), from in direction(), rim in 0.0..std::f64::consts::TAU,
             along in -1.0..1.0f64, kind in 0..4,
         ) {
             let (height, top, bottom) = size;
