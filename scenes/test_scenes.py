@@ -121,6 +121,11 @@ def test_city_has_the_counts_of_the_paper(cities):
         if node["extras"].get("quadric"):
             quadrics += 1
             refractive += "KHR_materials_transmission" in extensions
+            # A true quadric: a sphere that the node stretches, in the mesh's material.
+            binding = node["extensions"]["BUZZ_analytic_shape"]
+            shape = document["extensions"]["KHR_implicit_shapes"]["shapes"][binding["shape"]]
+            assert shape == {"type": "sphere", "sphere": {"radius": 1.0}}
+            assert binding["material"] == primitive["material"]
             continue
         # Faces share no vertices, and every face is a fan about its first.
         fans = len(np.unique(read(document, binary, primitive["indices"])[::3]))

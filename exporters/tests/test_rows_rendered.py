@@ -283,6 +283,51 @@ def test_usd_lights_instances_and_shapes(usd_convert, buzz, tmp_path):
     assert depth[32, 32] == pytest.approx(10.0, rel=1e-5)
 
 
+_GPRIMS = {
+    "Sphere": ({"radius": 0.8}, lambda x, y, z: np.sqrt(x * x + y * y + z * z) - 0.8),
+    "Cube": ({"size": 1.2}, lambda x, y, z: np.maximum(np.maximum(abs(x), abs(y)), abs(z)) - 0.6),
+    "Cylinder": ({"radius": 0.5, "height": 1.6, "axis": "X"}, lambda x, y, z: np.maximum(np.hypot(y, z) - 0.5, abs(x) - 0.8)),
+    "Cone": ({"radius": 0.7, "height": 1.5, "axis": "Z"}, lambda x, y, z: np.maximum(np.hypot(x, y) - 0.7 * (0.5 - z / 1.5), abs(z) - 0.75)),
+    "Capsule": ({"radius": 0.4, "height": 1.0, "axis": "Y"}, lambda x, y, z: np.sqrt(x * x + z * z + np.maximum(abs(y) - 0.5, 0) ** 2) - 0.4),
+    "Plane": ({"width": 1.6, "length": 1.0, "axis": "Z"}, lambda x, y, z: np.maximum(np.maximum(abs(x) - 0.8, abs(y) - 0.5), abs(z))),
+}
+
+
+@pytest.mark.parametrize("kind", _GPRIMS)
+def test_usd_gprims_are_rendered_as_what_they_are(usd_convert, buzz, tmp_path, kind):
+    """Turned and stretched: what is seen lies on the shape itself, and no ray that enters the shape passes it."""
+    pytest.importorskip("pxr", reason="SKIPPED LOUDLY: usd-core is not installed (pip install usd-core)")
+    import render_tools as r
+    import usd_scene as u
+    from pxr import Gf, Usd, UsdGeom, UsdRender
+
+    attributes, outside = _GPRIMS[kind]
+    made = u.stage("Y", 1.0, (1, 1))
+    camera = u.camera(made, focalLength=20.0, horizontalAperture=20.0, verticalAperture=20.0)
+    UsdGeom.XformCommonAPI(camera).SetTranslate((0, 0, 4))
+    UsdRender.Settings.Define(made, "/Render/Settings").CreateResolutionAttr(Gf.Vec2i(65, 65))
+    prim = made.DefinePrim("/World/Shape", kind)
+    for name, value in attributes.items():
+        prim.GetAttribute(name).Set(value)
+    UsdGeom.XformCommonAPI(prim).SetRotate((30, 40, 10))
+    UsdGeom.XformCommonAPI(prim).SetScale((1.0, 0.7, 1.2))
+    buzz(usd_convert(made).path, tmp_path / "out", "--aov", "depth", "-q", "full")
+    depth = r.read_exr(r.frames_of(tmp_path / "out")[1])["depth.Z"]
+    seen = depth < 1e9
+    assert 200 < seen.sum() < 3000
+    side = ((np.arange(65) + 0.5) / 65 * 2 - 1) * 0.5
+    rays = np.stack([*np.meshgrid(side, -side), np.full((65, 65), -1.0)], axis=-1)
+    local = np.linalg.inv(np.array(UsdGeom.XformCache(Usd.TimeCode(1)).GetLocalToWorldTransform(prim)))
+
+    def distance(depths):
+        points = np.array([0, 0, 4]) + rays * depths[..., None]
+        return outside(*np.moveaxis(points @ local[:3, :3] + local[3, :3], -1, 0))
+
+    assert abs(distance(depth)[seen]).max() < 1e-5
+    deepest = np.min([distance(np.full((65, 65), d)) for d in np.linspace(2.5, 5.5, 600)], axis=0)
+    assert seen[deepest < -2e-3].all()
+
+
 def test_usd_dome(usd_convert, buzz, tmp_path):
     """A dome whose image is red at its centre: the camera that looks along +Z sees red, along +X what is left of it."""
     pytest.importorskip("pxr", reason="SKIPPED LOUDLY: usd-core is not installed (pip install usd-core)")

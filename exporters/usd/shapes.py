@@ -128,7 +128,9 @@ class Geometries:
         if chosen:
             mesh["weights"] = [0.0] * len(chosen)
         item.mesh = document.append("meshes", mesh)
-        if item.implicit is not None and not _textured(document.root["materials"][primitives[0]["material"]]):
+        # What only a vertex can say is lost on a shape.
+        plain = not _textured(document.root["materials"][primitives[0]["material"]]) and "COLOR_0" not in primitives[0]["attributes"]
+        if item.implicit is not None and plain:
             document.use_extension("KHR_implicit_shapes")
             document.use_extension("BUZZ_analytic_shape")
             shapes = document.root.setdefault("extensions", {}).setdefault("KHR_implicit_shapes", {}).setdefault("shapes", [])

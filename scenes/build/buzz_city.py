@@ -9,8 +9,9 @@ The sky is a polygon too, and must not come between the light and the city. It l
 ground far ahead, over the city, to high behind the camera. The sun stands behind the camera, lower than that, and so
 shines in under it. The sky is unlit: it receives no shadow and no highlight, as in the paper.
 
-A polygon is one flat face, whatever number of triangles glTF makes of it. Each building and each quadric is a node, so
-that it has an object tag of its own; `extras` on the node give its polygons, and whether it reflects and refracts.
+A polygon is one flat face, whatever number of triangles glTF makes of it; a quadric is a true one, with a mesh beside
+it for readers that know none. Each building and each quadric is a node, so that it has an object tag of its own;
+`extras` on the node give its polygons, and whether it reflects and refracts.
 """
 
 from dataclasses import dataclass
@@ -79,6 +80,7 @@ def build():
         scene.node(solid.name, mesh=mesh, extras=extras)
     ball = sphere(40, 80)
     balls = {}
+    unit_sphere = scene.shape({"type": "sphere", "sphere": {"radius": 1.0}})
     for quadric in quadrics:
         if quadric.material not in balls:
             balls[quadric.material] = scene.mesh(quadric.material, (ball, materials[quadric.material]))
@@ -90,6 +92,7 @@ def build():
             rotation=rotation,
             scale=quadric.axes,
             mesh=balls[quadric.material],
+            extensions=scene.shape_binding(unit_sphere, materials[quadric.material]),
             extras=extras,
         )
     scene.sun("Sun", direction=-SUN, watts_per_m2=3.3, colour=(1.0, 0.95, 0.86))

@@ -23,6 +23,7 @@ class Scene:
         self.images = {}
         self.stored = {}
         self.lights = []
+        self.shapes = []
         self.frames = 0
         self.document = {
             "asset": {"version": "2.0", "generator": f"Buzz scenes/build/{name.replace('-', '_')}.py"},
@@ -160,6 +161,17 @@ class Scene:
             accessor |= {"min": table.min(axis=0).tolist(), "max": table.max(axis=0).tolist()}
         return self._add("accessors", accessor)
 
+    def shape(self, described):
+        """Adds an analytic shape, as KHR_implicit_shapes describes it; returns its index."""
+        self.shapes.append(described)
+        return len(self.shapes) - 1
+
+    def shape_binding(self, shape, material):
+        """What binds a shape to a node, beside the mesh that stands for it elsewhere: the node's `extensions`."""
+        self._require("KHR_implicit_shapes")
+        self._require("BUZZ_analytic_shape")
+        return {"BUZZ_analytic_shape": {"shape": shape, "material": material}}
+
     # ---- nodes
 
     def node(self, name, translation=(0, 0, 0), turn=0.0, rotation=None, scale=(1, 1, 1), **links):
@@ -250,8 +262,10 @@ class Scene:
     def files(self):
         """Every file of the scene: {path relative to its folder: bytes}."""
         document = dict(self.document)
-        if self.lights:
-            document["extensions"] = {"KHR_lights_punctual": {"lights": self.lights}}
+        shared = {"KHR_implicit_shapes": ("shapes", self.shapes), "KHR_lights_punctual": ("lights", self.lights)}
+        extensions = {name: {key: items} for name, (key, items) in shared.items() if items}
+        if extensions:
+            document["extensions"] = extensions
         document["buffers"] = [{"uri": f"{self.name}.bin", "byteLength": len(self.binary)}]
         text = json.dumps(document, indent=1) + "\n"
         return {f"{self.name}.gltf": text.encode(), f"{self.name}.bin": bytes(self.binary), **self.images}

@@ -34,6 +34,9 @@ impl Displaced {
     pub fn point(&self, scene: &Scene, surface: SurfaceRef) -> Vec3 {
         let index = surface.instance as usize;
         let mesh = &scene.meshes[scene.instances[index].mesh];
+        if let Some(shape) = &mesh.shape {
+            return self.placements[index].render_from_object.transform_point3(shape.point(surface).0);
+        }
         let positions = self.deformed[index].as_ref().map_or(&mesh.positions, |d| &d.positions);
         let [a, b, c] =
             mesh.triangles[surface.primitive as usize].map(|i| Vec3A::from(positions[i as usize]));

@@ -1,10 +1,11 @@
 //! Rays through both levels of trees.
 
 use super::opacity::{self, CULL_BACK, EYE_PASS, EYE_TEST, MIRRORED, SHADOW_PASS, SHADOW_TEST};
+use super::placed_shape::PlacedShape;
 use super::tree::Bounds;
 use super::triangle::{ShearedRay, TreeTriangle, TriangleHit};
 use super::wide::{Pending, SlabRay};
-use super::{Accel, Placed};
+use super::{Accel, Placed, PlacedTree};
 use crate::frame::SurfaceRef;
 use crate::scene::{Mesh, Scene, View};
 use glam::Vec3;
@@ -29,7 +30,8 @@ pub struct RayHit {
     pub t: f32,
     /// Where it is on which surface.
     pub surface: SurfaceRef,
-    /// True on the side from which the triangle is wound counter-clockwise (clockwise where its instance is mirrored).
+    /// True on the side from which the triangle is wound counter-clockwise (clockwise where its instance is mirrored),
+    /// and outside of a shape.
     pub front: bool,
 }
 
@@ -68,12 +70,20 @@ impl Accel {
         let &Ray { origin, direction, t_min, t_max } = ray;
         let hit = TriangleHit { t: t_max, u: 0.0, v: 0.0, front: true };
         let mut nearest = Nearest { hit, instance: SurfaceRef::NONE, primitive: 0 };
+        for shape in &self.endless {
+            self.nearest_on(scene, shape, &LocalRay { origin, direction, t_min }, 0.0, sides, &mut nearest);
+        }
         let start = self.bounds.approach(origin, direction);
         let ray = LocalRay { origin: origin + direction * start, direction, t_min: t_min - start };
         let slabs = SlabRay::new(ray.origin, ray.direction, ray.t_min);
         self.with_pending(|pending| {
-            self.upper.nearest(&slabs, t_max - start, pending, |slot, _, pending| {
-                self.nearest_in(scene, &self.placed[slot], &ray, start, sides, &mut nearest, pending);
+            self.upper.nearest(&slabs, nearest.hit.t - start, pending, |slot, _, pending| {
+                match &self.placed[slot] {
+                    Placed::Tree(tree) => {
+                        self.nearest_in(scene, tree, &ray, start, sides, &mut nearest, pending);
+                    }
+                    Placed::Shape(shape) => self.nearest_on(scene, shape, &ray, start, sides, &mut nearest),
+                }
                 nearest.hit.t - start
             });
         });
@@ -89,11 +99,17 @@ impl Accel {
         })
     }
 
-    /// Where a ray meets one known triangle, if it does, holes cut by alpha considered: its parameter and the point. Which
-    /// side it meets does not matter; nothing else is looked at.
-    pub fn meet(&self, scene: &Scene, ray: &Ray, surface: SurfaceRef) -> Option<(f32, SurfaceRef)> {
+    /// Where a ray meets one known triangle, if it does, holes cut by alpha considered. Which side it meets does not
+    /// matter; nothing else is looked at. Of a known shape, the nearest point that the eye would see is met.
+    pub fn meet(&self, scene: &Scene, ray: &Ray, surface: SurfaceRef) -> Option<RayHit> {
         let index = surface.instance as usize;
         let mesh = &scene.meshes[scene.instances[index].mesh];
+        if mesh.shape.is_some() {
+            let shape = PlacedShape::new(scene, surface.instance, self.placement(index))?;
+            let &Ray { origin, direction, t_min, t_max } = ray;
+            let ray = LocalRay { origin, direction, t_min };
+            return shape.meet(scene, &ray, t_max, Sides::Visible);
+        }
         let positions = self.positions(index, mesh);
         let m = &self.placement(index).render_from_object;
         let corners = mesh.triangles[surface.primitive as usize]
@@ -103,18 +119,26 @@ impl Accel {
         let flags = opacity::flags(scene, mesh);
         let present =
             flags & EYE_TEST == 0 || opacity::is_present_at(scene, mesh, surface.primitive, hit.u, hit.v);
-        present.then_some((hit.t, SurfaceRef { u: hit.u, v: hit.v, ..surface }))
+        let front = hit.front ^ (self.placement(index).winding < 0.0);
+        present.then_some(RayHit { t: hit.t, surface: SurfaceRef { u: hit.u, v: hit.v, ..surface }, front })
     }
 
     /// True if light passes from `from` along `direction` as far as `t_max` lengths of it: nothing there has an
     /// opacity, alpha x (1 - transmission), of one half or more. Both sides of every surface block it.
     pub fn unoccluded(&self, scene: &Scene, from: Vec3, direction: Vec3, t_max: f32) -> bool {
+        let whole = LocalRay { origin: from, direction, t_min: 0.0 };
+        if self.endless.iter().any(|shape| shape.blocks(scene, &whole, t_max)) {
+            return false;
+        }
         let start = self.bounds.approach(from, direction);
         let ray = LocalRay { origin: from + direction * start, direction, t_min: -start };
         let slabs = SlabRay::new(ray.origin, ray.direction, ray.t_min);
         !self.with_pending(|pending| {
             self.upper.any(&slabs, t_max - start, pending, |slot, pending| {
-                let placed = &self.placed[slot];
+                let placed = match &self.placed[slot] {
+                    Placed::Tree(tree) => tree,
+                    Placed::Shape(shape) => return shape.blocks(scene, &ray, t_max - start),
+                };
                 let (tree, instances) = self.lower(placed);
                 let (local, on) = placed.local(&ray, &tree.bounds);
                 let (slabs, sheared) = local.prepare();
@@ -147,7 +171,7 @@ impl Accel {
     fn nearest_in(
         &self,
         scene: &Scene,
-        placed: &Placed,
+        placed: &PlacedTree,
         ray: &LocalRay,
         start: f32,
         sides: Sides,
@@ -185,6 +209,28 @@ impl Accel {
         });
     }
 
+    /// Looks for something nearer on one shape; `start` is how far along the whole ray `ray` starts.
+    fn nearest_on(
+        &self,
+        scene: &Scene,
+        placed: &PlacedShape,
+        ray: &LocalRay,
+        start: f32,
+        sides: Sides,
+        nearest: &mut Nearest,
+    ) {
+        let Some(RayHit { t, surface, front }) = placed.meet(scene, ray, nearest.hit.t - start, sides) else {
+            return;
+        };
+        let SurfaceRef { instance, primitive, u, v } = surface;
+        let hit = TriangleHit { t: t + start, u, v, front };
+        let is_nearer =
+            hit.t < nearest.hit.t || (instance, primitive) < (nearest.instance, nearest.primitive);
+        if is_nearer {
+            *nearest = Nearest { hit, instance, primitive };
+        }
+    }
+
     /// Whether a triangle that is hit casts a shadow.
     fn blocks(&self, scene: &Scene, instances: &[u32], triangle: &TreeTriangle, hit: &TriangleHit) -> bool {
         let flags = triangle.flags();
@@ -203,10 +249,10 @@ impl Accel {
 }
 
 /// A ray in the space of a tree. Its direction is not normalised, so that its parameter is measured alike in all.
-struct LocalRay {
-    origin: Vec3,
-    direction: Vec3,
-    t_min: f32,
+pub(super) struct LocalRay {
+    pub origin: Vec3,
+    pub direction: Vec3,
+    pub t_min: f32,
 }
 
 impl LocalRay {
@@ -215,7 +261,7 @@ impl LocalRay {
     }
 }
 
-impl Placed {
+impl PlacedTree {
     /// The ray in the group's own space, and how far along the given one it starts.
     #[inline]
     fn local(&self, ray: &LocalRay, bounds: &Bounds) -> (LocalRay, f32) {

@@ -4,7 +4,7 @@
 //! transform: the materials of one glTF mesh are one tree, and instances of it share the tree. The upper level is a
 //! tree over the placed ones, in *render space*: world axes, metres, single precision, relative to an origin near the
 //! eye, so that a scene far from the world's origin keeps its precision. `obvhs` builds both levels; rays walk them in
-//! a form of their own.
+//! a form of their own. An analytic shape stands in the upper tree by itself; one that is infinite, beside it.
 //!
 //! Static scenes build their lower trees once; [`Accel::place`] then costs one small tree over the instances, and nothing
 //! at all when neither the origin nor an instance has moved.
@@ -14,6 +14,8 @@ mod displaced;
 mod fused;
 mod intersect;
 mod opacity;
+mod placed_shape;
+mod shape;
 mod tree;
 mod triangle;
 mod turned;
@@ -26,6 +28,7 @@ pub use displaced::Displaced;
 use fused::Fused;
 use glam::{Affine3A, DAffine3, DVec3, Mat3A, Vec3, Vec3A, Vec4};
 pub use intersect::{Ray, RayHit, Sides};
+use placed_shape::PlacedShape;
 use rayon::prelude::*;
 use std::collections::HashMap;
 use tree::{Bounds, Part, Tree, build};
@@ -47,6 +50,8 @@ pub struct Accel {
     placements: Vec<Placement>,
     /// What can be met, in the order of the upper tree.
     placed: Vec<Placed>,
+    /// Shapes that no box can hold.
+    endless: Vec<PlacedShape>,
     upper: WideTree,
     /// Entries that a ray may have pending at once in both levels.
     pending: usize,
@@ -62,10 +67,18 @@ struct Group {
     instances: Vec<u32>,
     /// Skinned or morphed: its tree is its own. Skinned vertices stand in render space already.
     deformable: bool,
+    /// A single analytic shape.
+    is_shape: bool,
 }
 
 /// What the upper tree holds.
-struct Placed {
+enum Placed {
+    Tree(PlacedTree),
+    Shape(PlacedShape),
+}
+
+/// A tree where it stands.
+struct PlacedTree {
     /// A group; none for the fused ones.
     group: Option<usize>,
     object_from_render: Affine3A,
@@ -114,6 +127,7 @@ impl Accel {
             deformed: scene.instances.iter().map(|_| None).collect(),
             placements: vec![Placement::default(); scene.instances.len()],
             placed: Vec::new(),
+            endless: Vec::new(),
             upper: WideTree::default(),
             pending: 0,
             bounds: Bounds::default(),
@@ -142,7 +156,7 @@ impl Accel {
             }
         }
         if moved {
-            self.build_upper();
+            self.build_upper(scene);
         }
     }
 
@@ -173,30 +187,39 @@ impl Accel {
         changed
     }
 
-    fn build_upper(&mut self) {
+    fn build_upper(&mut self, scene: &Scene) {
+        self.endless.clear();
         let mut bounds = Vec::new();
         let mut placed = Vec::new();
         for (number, group) in self.groups.iter().enumerate() {
             let tree = &self.trees[group.tree];
             let placement = group.instances.first().map(|&i| self.placements[i as usize]).unwrap_or_default();
+            let shape = group.instances.first().filter(|_| group.is_shape);
+            if let Some(shape) = shape.and_then(|&i| PlacedShape::new(scene, i, &placement)) {
+                match shape.bounds(scene) {
+                    Some(bound) => {
+                        bounds.push(bound.transformed(&placement.render_from_object));
+                        placed.push(Placed::Shape(shape));
+                    }
+                    None => self.endless.push(shape),
+                }
+                continue;
+            }
             if !placement.present || tree.bounds.is_empty() || self.still.binary_search(&number).is_ok() {
                 continue;
             }
-            let mut bound = Bounds::default();
-            for corner in tree.bounds.corners() {
-                bound.include(placement.render_from_object.transform_point3(corner));
-            }
-            bounds.push(bound);
-            placed.push(Placed {
+            bounds.push(tree.bounds.transformed(&placement.render_from_object));
+            placed.push(Placed::Tree(PlacedTree {
                 group: Some(number),
                 object_from_render: placement.render_from_object.inverse(),
-            });
+            }));
         }
         if !self.fused.tree.bounds.is_empty() {
             let anchor = (self.fused.anchor - self.origin).as_vec3();
             let Bounds { min, max } = self.fused.tree.bounds;
             bounds.push(Bounds { min: min + anchor, max: max + anchor });
-            placed.push(Placed { group: None, object_from_render: Affine3A::from_translation(-anchor) });
+            let object_from_render = Affine3A::from_translation(-anchor);
+            placed.push(Placed::Tree(PlacedTree { group: None, object_from_render }));
         }
         self.bounds = bounds.iter().fold(Bounds::default(), |mut all, b| {
             all.include(b.min);
@@ -204,7 +227,11 @@ impl Accel {
             all
         });
         let (upper, order) = build(&bounds, self.bounds.reach());
-        let lower = placed.iter().map(|p| self.lower(p).0.wide.pending()).max();
+        let lower = placed.iter().filter_map(|placed| match placed {
+            Placed::Tree(tree) => Some(self.lower(tree).0.wide.pending()),
+            Placed::Shape(_) => None,
+        });
+        let lower = lower.max();
         self.pending = upper.pending() + lower.unwrap_or(0);
         self.upper = upper;
         let mut slots: Vec<Option<Placed>> = placed.into_iter().map(Some).collect();
@@ -212,7 +239,7 @@ impl Accel {
     }
 
     /// The tree of what is placed, and the instances that are its parts.
-    fn lower(&self, placed: &Placed) -> (&Tree, &[u32]) {
+    fn lower(&self, placed: &PlacedTree) -> (&Tree, &[u32]) {
         match placed.group {
             Some(group) => (&self.trees[self.groups[group].tree], &self.groups[group].instances),
             None => (&self.fused.tree, &self.fused.instances),
@@ -229,13 +256,23 @@ impl Accel {
         let Some(instance) = scene.instances.get(surface.instance as usize) else { return Vec3::ZERO };
         let index = surface.instance as usize;
         let mesh = &scene.meshes[instance.mesh];
+        if let Some(shape) = &mesh.shape {
+            return self.placements[index].render_from_object.transform_point3(shape.point(surface).0);
+        }
         let positions = self.positions(index, mesh);
         let Some(triangle) = mesh.triangles.get(surface.primitive as usize) else { return Vec3::ZERO };
         let [a, b, c] = triangle.map(|i| Vec3A::from(positions[i as usize]));
         self.placements[index].render_from_object.transform_point3a(interpolate(a, b, c, surface)).into()
     }
 
-    /// The box around everything, relative to the origin; nothing where nothing is placed.
+    /// The unit normal of an analytic shape, outwards; none on triangles.
+    pub(crate) fn shape_normal(&self, scene: &Scene, surface: SurfaceRef) -> Option<Vec3> {
+        let index = surface.instance as usize;
+        let shape = scene.meshes[scene.instances[index].mesh].shape.as_ref()?;
+        Some((self.placements[index].normals * shape.point(surface).1).normalize_or(Vec3::Y))
+    }
+
+    /// The box around everything that has an end, relative to the origin; nothing where nothing such is placed.
     pub fn bounds(&self) -> Option<(Vec3, Vec3)> {
         (!self.bounds.is_empty()).then_some((self.bounds.min, self.bounds.max))
     }
@@ -281,13 +318,21 @@ fn group(scene: &Scene) -> (Vec<Group>, Vec<Vec<usize>>) {
     let mut groups: Vec<Group> = Vec::new();
     let mut rigid: HashMap<(usize, [u64; 12]), usize> = HashMap::new();
     for (i, instance) in scene.instances.iter().enumerate() {
-        let deformable = is_deformable(scene, instance);
+        let is_shape = scene.meshes[instance.mesh].shape.is_some();
+        let deformable = !is_shape && is_deformable(scene, instance);
         let new = groups.len();
         let key = (instance.node, instance.node_from_object.to_cols_array().map(f64::to_bits));
-        let number = if deformable { new } else { *rigid.entry(key).or_insert(new) };
+        let number = if deformable || is_shape { new } else { *rigid.entry(key).or_insert(new) };
         if number == new {
             let (node, node_from_object) = (instance.node, instance.node_from_object);
-            groups.push(Group { tree: 0, node, node_from_object, instances: Vec::new(), deformable });
+            groups.push(Group {
+                tree: 0,
+                node,
+                node_from_object,
+                instances: Vec::new(),
+                deformable,
+                is_shape,
+            });
         }
         groups[number].instances.push(i as u32);
     }

@@ -3,7 +3,7 @@
 //! A material that is the same everywhere is decided once, so that only rays that meet a surface whose alpha or
 //! transmission comes from a texture pay for a lookup.
 
-use crate::scene::{AlphaMode, Material, Mesh, Scene};
+use crate::scene::{AlphaMode, Material, Mesh, Scene, Shape};
 use glam::Vec2;
 
 /// Back faces are not there for rays from the eye.
@@ -24,16 +24,18 @@ const MIN_ALPHA: f32 = 1.0 / 255.0;
 /// From this opacity on a surface casts a shadow.
 const SHADOW_OPACITY: f32 = 0.5;
 
-/// True if the eye looks through a surface's back.
-pub(super) fn culls_back(material: &Material) -> bool {
-    !material.double_sided && material.transmission == 0.0
+/// True if the eye looks through the back of a surface of `mesh`.
+pub(super) fn culls_back(scene: &Scene, mesh: &Mesh) -> bool {
+    let material = &scene.materials[mesh.material];
+    let double_sided = material.double_sided || mesh.shape.as_ref().is_some_and(Shape::is_double_sided);
+    !double_sided && material.transmission == 0.0
 }
 
-/// The flags of triangles of `mesh`.
+/// The flags of triangles of `mesh`, or of its shape.
 pub(super) fn flags(scene: &Scene, mesh: &Mesh) -> u32 {
     let material = &scene.materials[mesh.material];
     let mut flags = 0;
-    if culls_back(material) {
+    if culls_back(scene, mesh) {
         flags |= CULL_BACK;
     }
     let uniform_alpha = material.alpha_mode == AlphaMode::Opaque

@@ -4,7 +4,7 @@ use super::opacity;
 use super::triangle::TreeTriangle;
 use super::wide::WideTree;
 use crate::scene::Scene;
-use glam::Vec3;
+use glam::{Affine3A, Vec3};
 use obvhs::aabb::Aabb;
 use obvhs::bvh2::reinsertion::ReinsertionOptimizer;
 use obvhs::cwbvh::bvh2_to_cwbvh::bvh2_to_cwbvh;
@@ -75,6 +75,13 @@ impl Bounds {
             let (min, max) = (self.min, self.max);
             Vec3::new(pick(1, min.x, max.x), pick(2, min.y, max.y), pick(4, min.z, max.z))
         })
+    }
+
+    /// The box around this one where `m` puts it.
+    pub fn transformed(&self, m: &Affine3A) -> Self {
+        let mut bounds = Self::default();
+        self.corners().into_iter().for_each(|corner| bounds.include(m.transform_point3(corner)));
+        bounds
     }
 
     /// The largest absolute coordinate.

@@ -18,7 +18,7 @@ impl Accel {
             let instance = &scene.instances[index];
             let placement = self.placement(index);
             let mesh = &scene.meshes[instance.mesh];
-            let culled = opacity::culls_back(&scene.materials[mesh.material]);
+            let culled = opacity::culls_back(scene, mesh);
             let object_from_render = placement.render_from_object.inverse();
             let [old, new] = eyes.map(|(at, w)| {
                 let at = if w > 0.0 {

@@ -337,7 +337,7 @@ fn report(
         },
         scene: SceneSummary {
             triangles: scene.triangle_count(),
-            shapes: 0,
+            shapes: scene.shape_count(),
             instances: scene.instances.len(),
             lights: scene.lights.len(),
             requires: Requirements::of(scene).names().iter().map(|&n| n.into()).collect(),

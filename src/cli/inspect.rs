@@ -52,7 +52,7 @@ fn as_json(scene: &Scene) -> Value {
     json!({
         "schema": "buzz-scene/1",
         "triangles": scene.triangle_count(),
-        "shapes": 0,
+        "shapes": scene.shape_count(),
         "instances": scene.instances.len(),
         "cameras": cameras.collect::<Vec<_>>(),
         "lights": lights.collect::<Vec<_>>(),
@@ -71,8 +71,9 @@ fn as_text(scene: &Scene) -> String {
     let needs = Requirements::of(scene);
     let timing = &scene.timing;
     let mut text = format!(
-        "{} triangles in {} instances, {} materials, {} images, {} lights, {} cameras\n",
+        "{} triangles and {} shapes in {} instances, {} materials, {} images, {} lights, {} cameras\n",
         scene.triangle_count(),
+        scene.shape_count(),
         scene.instances.len(),
         scene.materials.len(),
         scene.images.len(),

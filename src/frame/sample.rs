@@ -2,16 +2,18 @@
 
 use glam::{Vec2, Vec3, vec2};
 
-/// A point on a surface: which instance, which triangle, where in it.
+/// A point on a surface: which instance, which triangle, where in it; or of an analytic shape, which part.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SurfaceRef {
     /// Index into `Scene::instances`; [`SurfaceRef::NONE`] for the background.
     pub instance: u32,
-    /// Index into `Mesh::triangles`.
+    /// Index into `Mesh::triangles`. Of a shape: which of its faces, and which way that looks most: six numbers a face, for
+    /// +X, -X, +Y, -Y, +Z, -Z of the object's axes.
     pub primitive: u32,
-    /// Barycentric weight of the triangle's second vertex.
+    /// Barycentric weight of the triangle's second vertex. Of a shape: the object coordinate on the axis after that
+    /// which the face looks along (X, Y, Z, X, ...), metres.
     pub u: f32,
-    /// Barycentric weight of the triangle's third vertex.
+    /// Barycentric weight of the triangle's third vertex. Of a shape: the coordinate on the axis after that.
     pub v: f32,
 }
 

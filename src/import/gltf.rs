@@ -12,6 +12,7 @@ use super::{
     image::{self, Images},
     light_camera, material,
     nodes::{self, Nodes},
+    shape::Shapes,
 };
 use crate::{
     Result,
@@ -68,24 +69,34 @@ fn read_geometry(accessors: Accessors, nodes: &mut Nodes, scene: &mut Scene, not
     let document = accessors.document;
     let mut geometry = Geometry::new(accessors, notes)?;
     let mut primitives: Vec<Primitive> = Vec::new();
+    let mut shapes = Shapes::default();
     let mut mesh_ranges: HashMap<usize, std::ops::Range<usize>> = HashMap::new();
     let mut skins: HashMap<usize, usize> = HashMap::new();
     for (i, node) in document.elements("nodes")?.iter().enumerate().filter(|(i, _)| nodes.in_scene[*i]) {
-        let Some(index) = node.index("mesh")? else { continue };
-        let element = document.element("meshes", index, &node.place)?;
-        let range = match mesh_ranges.get(&index) {
-            Some(range) => range.clone(),
-            None => {
-                let start = primitives.len();
-                primitives.extend(geometry.mesh(&element)?);
-                mesh_ranges.insert(index, start..primitives.len());
-                start..primitives.len()
+        let shape = shapes.of(node, &mut primitives)?;
+        let range = match (shape, node.index("mesh")?) {
+            // The mesh beside a shape is for readers that do not know shapes.
+            (Some(shape), _) => shape..shape + 1,
+            (None, None) => continue,
+            (None, Some(index)) => {
+                let element = document.element("meshes", index, &node.place)?;
+                let range = match mesh_ranges.get(&index) {
+                    Some(range) => range.clone(),
+                    None => {
+                        let start = primitives.len();
+                        primitives.extend(geometry.mesh(&element)?);
+                        mesh_ranges.insert(index, start..primitives.len());
+                        start..primitives.len()
+                    }
+                };
+                let targets = primitives[range.clone()].iter().map(|p| p.mesh.morph_targets.len());
+                let targets = targets.max().unwrap_or(0);
+                accessors.buffers.budget.take(targets, size_of::<f32>(), |message| node.error(message))?;
+                nodes.nodes[nodes.scene_node[i]].weights = weights(node, &element, targets)?;
+                range
             }
         };
-        let targets = primitives[range.clone()].iter().map(|p| p.mesh.morph_targets.len()).max().unwrap_or(0);
-        accessors.buffers.budget.take(targets, size_of::<f32>(), |message| node.error(message))?;
-        nodes.nodes[nodes.scene_node[i]].weights = weights(node, &element, targets)?;
-        let skin = match node.index("skin")? {
+        let skin = match node.index("skin")?.filter(|_| shape.is_none()) {
             None => None,
             Some(index) => Some(match skins.get(&index) {
                 Some(&skin) => skin,

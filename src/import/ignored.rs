@@ -10,10 +10,12 @@ use std::{
 
 /// Extensions that are read. Everything else in `extensionsRequired` is refused.
 const READ: &[&str] = &[
+    "BUZZ_analytic_shape",
     "EXT_mesh_gpu_instancing",
     "EXT_meshopt_compression",
     "EXT_texture_webp",
     "KHR_animation_pointer",
+    "KHR_implicit_shapes",
     "KHR_lights_punctual",
     "KHR_materials_emissive_strength",
     "KHR_materials_ior",
@@ -50,8 +52,6 @@ const NOT_RENDERED: &[(&str, &str)] = &[
     ("EXT_lights_image_based", "the light is left out; set a world in extras.buzz"),
     ("EXT_lights_ies", "the light has the punctual shape"),
     ("EXT_lights_area", "the light is left out or a spot"),
-    ("KHR_implicit_shapes", "the meshes beside the shapes are used"),
-    ("BUZZ_analytic_shape", "the mesh beside the shape is used"),
     ("KHR_audio_emitter", "no sound is written"),
     ("KHR_interactivity", "nothing reacts"),
     ("KHR_physics_rigid_bodies", "nothing is simulated"),

@@ -23,6 +23,7 @@ mod meshopt;
 mod nodes;
 mod obj;
 mod primitive;
+mod shape;
 mod turntable;
 mod uri;
 

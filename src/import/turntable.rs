@@ -90,6 +90,10 @@ fn bounds(scene: &Scene, pose: &Pose) -> (DVec3, DVec3) {
         .meshes
         .iter()
         .map(|mesh| {
+            if let Some(shape) = &mesh.shape {
+                let [low, high] = shape.bounds();
+                return (low, high);
+            }
             let start = (DVec3::INFINITY, DVec3::NEG_INFINITY);
             mesh.positions
                 .iter()

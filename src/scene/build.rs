@@ -3,12 +3,17 @@
 //! Importers fill [`Scene`]'s fields themselves. These are for programs and tests that have no file.
 
 use super::{
-    Camera, Instance, Lens, Light, LightKind, LocalTransform, Material, Mesh, Node, Projection, Scene,
+    Camera, Instance, Lens, Light, LightKind, LocalTransform, Material, Mesh, Node, Projection, Scene, Shape,
 };
 use glam::{DAffine3, DMat3, DVec2, DVec3, Vec2, Vec3};
 use std::f32::consts::{PI, TAU};
 
 impl Mesh {
+    /// An analytic shape.
+    pub fn analytic(shape: Shape, material: usize) -> Self {
+        Self { name: "shape".to_owned(), shape: Some(shape), material, ..Self::default() }
+    }
+
     /// A square in the XZ plane, seen from +Y, from -`half` to `half` metres on both axes. Texture coordinates go from
     /// 0 to 1 along +X and +Z.
     pub fn plane(half: f32, material: usize) -> Self {

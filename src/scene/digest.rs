@@ -40,6 +40,9 @@ impl Scene {
 impl Mesh {
     fn digest(&self, feed: &mut dyn FnMut(&str, &[u8])) {
         feed("mesh", format!("{} {}", self.name, self.material).as_bytes());
+        if let Some(shape) = &self.shape {
+            feed("shape", format!("{shape:?}").as_bytes());
+        }
         feed("positions", bytemuck::cast_slice::<Vec3, u8>(&self.positions));
         feed("normals", bytemuck::cast_slice::<Vec3, u8>(&self.normals));
         feed("tangents", bytemuck::cast_slice::<Vec4, u8>(&self.tangents));

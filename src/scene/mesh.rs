@@ -1,8 +1,9 @@
 //! Triangle meshes, their instances, and what deforms them.
 
+use super::Shape;
 use glam::{DAffine3, DMat4, Vec2, Vec3, Vec4};
 
-/// A triangle mesh in object space.
+/// A triangle mesh in object space, or an analytic shape that stands for one.
 ///
 /// Attribute arrays are either empty or as long as `positions`. An empty `normals` means flat shading.
 #[derive(Debug, Clone, Default)]
@@ -21,6 +22,8 @@ pub struct Mesh {
     pub colors: Vec<Vec4>,
     /// Vertex indices, counter-clockwise seen from the front.
     pub triangles: Vec<[u32; 3]>,
+    /// What is rendered instead of triangles; then all arrays here are empty.
+    pub shape: Option<Shape>,
     /// Index into [`super::Scene::materials`].
     pub material: usize,
     /// Morph targets, displacements added by weight.

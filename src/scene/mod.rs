@@ -15,6 +15,7 @@ mod mesh;
 mod names;
 mod pose;
 mod requirements;
+mod shape;
 mod texture;
 mod timing;
 
@@ -25,6 +26,8 @@ pub use material::{AlphaMode, Material, NormalTexture, Volume};
 pub use mesh::{Instance, Mesh, MorphTarget, Skin};
 pub use pose::{LocalTransform, Node, Pose};
 pub use requirements::{MIRROR_ROUGHNESS, Requirements};
+pub(crate) use shape::Face;
+pub use shape::{Quadric, Shape};
 pub use texture::{ColorSpace, Image, TextureRef, Wrap};
 pub use timing::{Cut, Rational, Timing};
 
@@ -37,7 +40,7 @@ pub struct Scene {
     pub nodes: Vec<Node>,
     /// Meshes placed in the world.
     pub instances: Vec<Instance>,
-    /// Triangle meshes, one for each material of a glTF mesh.
+    /// Triangle meshes, one for each material of a glTF mesh, and analytic shapes.
     pub meshes: Vec<Mesh>,
     /// Skeletons that instances are bound to.
     pub skins: Vec<Skin>,
@@ -76,5 +79,10 @@ impl Scene {
     /// Number of triangles drawn, each instance counted.
     pub fn triangle_count(&self) -> usize {
         self.instances.iter().map(|i| self.meshes[i.mesh].triangles.len()).sum()
+    }
+
+    /// Number of analytic shapes drawn, each instance counted.
+    pub fn shape_count(&self) -> usize {
+        self.instances.iter().filter(|i| self.meshes[i.mesh].shape.is_some()).count()
     }
 }

@@ -14,6 +14,8 @@ pub struct Requirements {
     pub reflection: bool,
     /// Something lets light through.
     pub refraction: bool,
+    /// Something is an analytic shape.
+    pub analytic_shapes: bool,
     /// Nodes other than cameras and lights move, are deformed, appear or vanish.
     pub moving_objects: bool,
     /// Lights have a size: their shadows are soft.
@@ -42,6 +44,7 @@ impl Requirements {
                 may_be_smooth && !material.unlit && (material.specular > 0.0 || material.metallic > 0.0);
             needs.refraction |= material.transmission > 0.0 || material.alpha_mode == AlphaMode::Blend;
         }
+        needs.analytic_shapes = scene.shape_count() > 0;
         needs.soft_lights = (0..scene.lights.len()).any(|l| scene.light_has_size(l));
         needs.ambient_light = scene.world.color != Vec3::ZERO;
         let moved = scene.moved_nodes();
@@ -73,6 +76,7 @@ impl Requirements {
             (self.alpha, "alpha"),
             (self.reflection, "reflection"),
             (self.refraction, "refraction"),
+            (self.analytic_shapes, "analytic-shapes"),
             (self.soft_lights, "soft-lights"),
             (self.ambient_light, "ambient-light"),
             (self.moving_objects, "moving-objects"),

@@ -151,8 +151,8 @@ impl<'a> Tracer<'a> {
         self.layout.differ(a, b, differ);
     }
 
-    /// What the ray through raster position (x, y) meets first if it can meet nothing but the triangles of
-    /// `candidates`; no ray is cast into the scene, and none is counted. Where the candidates are the background, that.
+    /// What the ray through raster position (x, y) meets first if it can meet nothing but the triangles and shapes
+    /// of `candidates`; no ray is cast into the scene, and none is counted. Where the candidates are the background, that.
     pub fn nearest_of(
         &self,
         view: &View,
@@ -166,11 +166,14 @@ impl<'a> Tracer<'a> {
             if candidate.surface.is_background() {
                 return Some(SurfaceSample::background(ray.direction.normalize_or(Vec3::NEG_Z)));
             }
-            if let Some((t, surface)) = self.accel.meet(self.scene, &ray, candidate.surface) {
-                ray.t_max = t;
-                let position = self.accel.surface_point(self.scene, surface);
-                nearest = Some(SurfaceSample { position, surface, ..candidate });
-            }
+            let Some(hit) = self.accel.meet(self.scene, &ray, candidate.surface) else { continue };
+            ray.t_max = hit.t;
+            let position = self.accel.surface_point(self.scene, hit.surface);
+            // A triangle looks the same way everywhere, as it was seen before.
+            let outward = self.accel.shape_normal(self.scene, hit.surface);
+            let seen = outward.map(|n| PackedNormal::new(if hit.front { n } else { -n }));
+            let normal = seen.unwrap_or(candidate.normal);
+            nearest = Some(SurfaceSample { position, surface: hit.surface, normal, ..candidate });
         }
         nearest
     }

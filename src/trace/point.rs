@@ -14,7 +14,8 @@ const OFFSET_ROUNDINGS: f32 = 32.0;
 pub(super) struct SurfacePoint<'a> {
     pub mesh: &'a Mesh,
     pub material: &'a Material,
-    /// The triangle's corners, as vertex numbers, and their barycentric weights here.
+    /// The triangle's corners, as vertex numbers, and their barycentric weights here. A shape has none, and no attributes
+    /// that would be asked for at them.
     pub corners: [usize; 3],
     pub weights: [f32; 3],
     /// The triangle's edges from its first corner.
@@ -37,6 +38,16 @@ pub(super) enum Side {
     Towards(Vec3),
 }
 
+impl Side {
+    /// Whether it is the front of a surface that looks this way.
+    fn is_front(&self, outward: Vec3) -> bool {
+        match self {
+            Self::Front(front) => *front,
+            Self::Towards(direction) => outward.dot(*direction) >= 0.0,
+        }
+    }
+}
+
 impl<'a> SurfacePoint<'a> {
     /// The point at `surface`, which must not be the background.
     pub fn new(scene: &'a Scene, accel: &'a Accel, surface: SurfaceRef, side: Side) -> Self {
@@ -44,27 +55,46 @@ impl<'a> SurfacePoint<'a> {
         let mesh = &scene.meshes[scene.instances[index].mesh];
         let material = &scene.materials[mesh.material];
         let placement = accel.placement(index);
+        let m = &placement.render_from_object;
+        let roundings = OFFSET_ROUNDINGS * f32::EPSILON * 0.5;
+        if let Some(shape) = &mesh.shape {
+            let (local, _) = shape.point(surface);
+            let position = m.transform_point3(local);
+            let outward = accel.shape_normal(scene, surface).unwrap_or(Vec3::Y);
+            let front = side.is_front(outward);
+            let geometric = if front { outward } else { -outward };
+            let magnitude = m.matrix3.abs() * Vec3A::from(local.abs()) + m.translation.abs();
+            let offset = magnitude.max_element() * roundings;
+            let (corners, weights, edges) = ([0; 3], [0.0; 3], [Vec3::ZERO; 2]);
+            return Self {
+                mesh,
+                material,
+                corners,
+                weights,
+                edges,
+                position,
+                geometric,
+                front,
+                offset,
+                surface,
+            };
+        }
         let corners = mesh.triangles[surface.primitive as usize].map(|i| i as usize);
         let positions = accel.positions(index, mesh);
         let [a, b, c] = corners.map(|i| Vec3A::from(positions[i]));
         let weights = [1.0 - surface.u - surface.v, surface.u, surface.v];
 
-        let m = &placement.render_from_object;
         let position: Vec3 = m.transform_point3a(interpolate(a, b, c, surface)).into();
         let edges = [b - a, c - a].map(|e| Vec3::from(m.transform_vector3a(e)));
         let cross = edges[0].cross(edges[1]);
         let outward = cross.normalize_or(Vec3::Y) * placement.winding;
-        let front = match side {
-            Side::Front(front) => front,
-            Side::Towards(direction) => outward.dot(direction) >= 0.0,
-        };
+        let front = side.is_front(outward);
         let geometric = if front { outward } else { -outward };
 
         let magnitude = m.matrix3.abs()
             * (a.abs() * weights[0] + b.abs() * weights[1] + c.abs() * weights[2])
             + m.translation.abs();
-        let offset =
-            (magnitude.max_element() + placement.fused_reach) * (OFFSET_ROUNDINGS * f32::EPSILON * 0.5);
+        let offset = (magnitude.max_element() + placement.fused_reach) * roundings;
         Self { mesh, material, corners, weights, edges, position, geometric, front, offset, surface }
     }
 

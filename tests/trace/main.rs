@@ -4,5 +4,6 @@ mod eye;
 mod light;
 mod rig;
 mod robust;
+mod shapes;
 mod soft;
 mod solid;
