@@ -5,7 +5,7 @@
     .venv/bin/python scenes/trade.py OUT [--resolution 640x360] [scene ...]
 
 The pages with pictures stay in OUT/<scene>/trade.html. Interpolation by optical flow (`interpolate.py`) is measured
-on the same frames, as far as it makes them: every fourth frame of the full sequence is given to it.
+on the same frames, as far as it makes them: every fourth of them is given to it.
 """
 
 import argparse
@@ -27,7 +27,7 @@ SCENES |= {
     "zdm2_fastpan": WALKS / "zdm2_fastpan.glb",
     "kaykit_dungeon_walk": WALKS / "kaykit_dungeon_walk.glb",
 }
-# Longer ones are interpolated over a part: a minute of it is enough.
+# Longer ones are interpolated over a part.
 MOST_FRAMES = 120
 TITLES = ["scene", "quality", "ms a frame", "inferred, ms (10-90 %)", "times as fast", "rays a pixel", "PSNR dB"]
 TITLES += ["worst dB", "FLIP", "over 5 %", "hidden"]
@@ -49,8 +49,7 @@ def run(*command: str | Path) -> str:
 
 def baseline(binary: Path, scene: Path, out: Path, resolution: str, trade: dict) -> dict[str, float]:
     """Interpolation's error on the frames that were measured."""
-    plan = json.loads(run(binary, "plan", scene, "--format", "json", "-r", "16x9", "-q", "full"))
-    first, last = plan["frames"][0]["frame"], plan["frames"][-1]["frame"]
+    first, last = trade["spans"][0][0], trade["spans"][-1][1]
     last = min(last, first + MOST_FRAMES - 1)
     options = ["-q", "full", "-r", resolution, "-f", f"{first}-{last}", "--skip-existing", "--progress", "none"]
     run(binary, scene, out, *options)
