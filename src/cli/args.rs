@@ -101,7 +101,7 @@ pub struct CompareArgs {
 pub struct TradeArgs {
     /// The scene: .gltf, .glb, or .obj (with --camera-from or --turntable).
     pub input: PathBuf,
-    /// Folder for trade.json, trade.csv and trade.html.
+    /// Folder for trade.html, trade.txt, trade.csv and trade.json.
     pub out_dir: PathBuf,
     #[command(flatten)]
     pub scene: SceneArgs,

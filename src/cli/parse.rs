@@ -168,7 +168,7 @@ pub fn aovs(text: &str) -> Result<AovSet> {
     for name in text.split(',').map(str::trim) {
         match (name, NAMES.iter().find(|(n, _)| *n == name)) {
             (_, Some((_, aov))) => set = set.with(*aov),
-            ("all", _) => set = NAMES.iter().map(|(_, aov)| *aov).collect(),
+            ("all", _) => set = Aov::ALL.into_iter().collect(),
             ("beauty", _) => set = set.with(Aov::Depth).with(Aov::Class),
             _ => {
                 let names: Vec<&str> = NAMES.iter().map(|(n, _)| *n).collect();

@@ -40,14 +40,16 @@ pub fn run(args: TradeArgs) -> Result<ExitCode> {
     let input = args.input.display().to_string();
     let Job { scene, accel, .. } = &mut job;
     let result = trade(&input, scene, accel, &candidates, &spans, &mut watch)?;
-    write(&result, &args.out_dir)?;
-    say::result(&result.to_string())?;
+    let table = result.to_string();
+    write(&result, &table, &args.out_dir)?;
+    say::result(&table)?;
     Ok(ExitCode::SUCCESS)
 }
 
-fn write(trade: &Trade, folder: &Path) -> Result<()> {
-    let json = serde_json::to_string_pretty(trade)? + "\n";
-    for (name, text) in [("trade.json", json), ("trade.csv", trade.csv()), ("trade.html", trade.html())] {
+fn write(trade: &Trade, table: &str, folder: &Path) -> Result<()> {
+    let (json, csv, html) = (serde_json::to_string_pretty(trade)? + "\n", trade.csv(), trade.html());
+    let files = [("trade.txt", table), ("trade.json", &json), ("trade.csv", &csv), ("trade.html", &html)];
+    for (name, text) in files {
         write_alone(&folder.join(name), text.as_bytes())?;
     }
     Ok(())

@@ -45,7 +45,7 @@ pub enum Aov {
 
 impl Aov {
     /// All of them.
-    pub const ALL: [Self; 10] = [
+    pub const ALL: [Self; 11] = [
         Self::Depth,
         Self::Class,
         Self::Normal,
@@ -56,6 +56,7 @@ impl Aov {
         Self::Specular,
         Self::Emission,
         Self::Lights,
+        Self::Crypto,
     ];
 
     /// Bytes that a pixel of the layer takes in a [`Frame`], where there are so many lights.

@@ -32,7 +32,8 @@ const MOVED: u32 = 1 << 30;
 /// How much is believed without a ray.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Trust {
-    /// Shadow bits on which all that is known around agrees; reused samples before which no line L passes.
+    /// Shadow bits on which all that is known around agrees; reused samples before which no line L passes, but for a few
+    /// that a ray proves visible, so that nothing new stays unseen for long.
     Neighbours,
     /// Shadow bits on which the whole neighbourhood is known to agree; reused samples that a ray has proven visible.
     Proof,

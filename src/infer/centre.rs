@@ -51,8 +51,19 @@ pub trait CastCentres: CastRays {
     fn is_hidden(&self, sample: &SurfaceSample, counts: &mut RayCounts) -> bool;
 }
 
+/// One pixel in so many, on either axis, is proven visible whatever is known about it.
+///
+/// What was too small to be sampled when it was far away would never be met, however large it grows: nothing lands on it,
+/// and all around it agree that it is not there. Here it is met once it covers this many pixels, and from then on its edges
+/// are cast and it fills its outline, a pixel a frame.
+const LOOKOUT: usize = 8;
+
 /// So many samples must be known in the 3x3 around a pixel before it is filled from them.
 const ENOUGH_TO_FILL: usize = 3;
+
+fn is_lookout(x: usize, y: usize) -> bool {
+    x % LOOKOUT == LOOKOUT / 2 && y % LOOKOUT == LOOKOUT / 2
+}
 
 /// What re-centring holds between frames, so that nothing is allocated for each.
 #[derive(Debug, Default)]
@@ -133,11 +144,12 @@ impl Centring {
         });
     }
 
-    /// Casts the rays that are still wanted: to see what pixels show, and to the lights that may reach it.
+    /// Casts the rays that are still wanted: to see what pixels show, and to the lights that may reach it. `moves` says
+    /// whether the camera does.
     pub fn cast(
         &mut self,
         old: &BuzzBuffer,
-        view: &Projector,
+        (view, moves): (&Projector, bool),
         rays: &impl CastCentres,
         trust: Trust,
         new: &mut BuzzBuffer,
@@ -152,7 +164,8 @@ impl Centring {
             for x in 0..width {
                 let (pixel, ask) = (y * width + x, &mut ask[x * words..][..words]);
                 let known = row.object[x] != UNKNOWN;
-                if known && trust == Trust::Proof && rays.is_hidden(&row.sample(x), &mut counts) {
+                let looks = trust == Trust::Proof || (moves && is_lookout(x, y));
+                if known && looks && rays.is_hidden(&row.sample(x), &mut counts) {
                     row.class[x] = PixelClass::Bad;
                     row.object[x] = UNKNOWN;
                 }

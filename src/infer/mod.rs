@@ -123,7 +123,8 @@ impl Inference {
 
         // Centre what lies within surfaces; cast rays at edges, at what nothing explains, and along shadows' edges.
         self.centring.recentre(old, (&self.landings, &self.marks), &to, rays, trust, new);
-        cost.add(|| self.centring.cast(old, &to, rays, trust, new));
+        let moves = old_view != new_view;
+        cost.add(|| self.centring.cast(old, (&to, moves), rays, trust, new));
         cost
     }
 

@@ -6,8 +6,9 @@ use crate::scene::{LightKind, Outline, PosedLight};
 use glam::{DVec3, Vec2, Vec3};
 use std::f32::consts::{PI, TAU};
 
-/// Nearer than this a light without size grows no brighter, metres: the inverse square would overflow.
-const MIN_DISTANCE: f32 = 1e-4;
+/// Nearer than this a light without size grows no brighter, metres: the inverse square would overflow. Far less than what
+/// is seen of a scene that is a millionth of a metre across.
+const MIN_DISTANCE: f32 = 1e-10;
 
 /// An area light that covers less than this, in steradians, shines as if from its middle.
 const POINT_LIKE: f32 = 1e-6;

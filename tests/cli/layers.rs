@@ -1,17 +1,19 @@
 //! What the layers say agrees with each other and with the matrices in the header.
 
-use crate::rig::{channels, courtyard, fresh, run};
+use crate::rig::{channels, courtyard, fresh, json, run};
 use crate::stage::{CARD, Stage};
 use exr::meta::MetaData;
 use glam::{Mat4, Vec3, Vec3Swizzles};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-/// A frame's file: its channels, its size, and its matrix from the world to normalised device coordinates.
+/// A frame's file: its channels, its size, and its matrices from the world to the camera and to normalised device
+/// coordinates.
 struct Layers {
     channels: BTreeMap<String, Vec<f32>>,
     width: usize,
     height: usize,
+    camera_from_world: Mat4,
     ndc_from_world: Mat4,
 }
 
@@ -19,13 +21,17 @@ impl Layers {
     fn read(path: &Path) -> Self {
         let meta = MetaData::read_from_file(path, false).unwrap();
         let header = &meta.headers[0];
-        let matrix = header.own_attributes.world_to_normalized_device.unwrap();
+        let attributes = &header.own_attributes;
+        // For row vectors, row by row: for column vectors, column by column.
+        let [camera_from_world, ndc_from_world] =
+            [attributes.world_to_camera, attributes.world_to_normalized_device]
+                .map(|matrix| Mat4::from_cols_array(&matrix.unwrap()));
         Self {
             channels: channels(path),
             width: header.layer_size.0,
             height: header.layer_size.1,
-            // For row vectors, row by row: for column vectors, column by column.
-            ndc_from_world: Mat4::from_cols_array(&matrix),
+            camera_from_world,
+            ndc_from_world,
         }
     }
 
@@ -89,20 +95,26 @@ fn the_parts_add_up_to_the_beauty() {
 }
 
 #[test]
-fn positions_land_in_their_pixels() {
+fn positions_and_depths_agree_with_the_matrices() {
     for (scene, name) in [(courtyard(), "courtyard.0030.exr"), (gallery(), "gallery.0030.exr")] {
-        // A traced point lies on the ray through its pixel's centre, a reused one inside its pixel.
-        for (quality, allowed) in [("full", 0.02), ("half-pixel", 0.5 + 0.02)] {
+        // A point lies on the ray through its pixel's centre; one that half-pixel reuses, anywhere in its pixel.
+        for (quality, allowed) in [("full", 0.02), ("centred", 0.02), ("half-pixel", 0.5 + 0.02)] {
             let (_folder, out) = fresh();
-            run(&scene, &out, &format!("-r 320x180 -f 30 -q {quality} --aov position,object,depth")).ok();
+            run(&scene, &out, &format!("-r 320x180 -f 30 -q {quality} --aov position,object,depth,class"))
+                .ok();
             let layers = Layers::read(&out.join(name));
-            let mut count = 0;
+            let (mut count, mut reused) = (0, 0);
             for i in layers.surfaces() {
                 let off = (layers.raster(layers.position(i)) - layers.center(i)).abs().max_element();
                 assert!(off <= allowed, "{name}, {quality}, pixel {i}: {off}");
+                let z = layers.camera_from_world.transform_point3(layers.position(i)).z;
+                let depth = layers.at("depth.Z", i);
+                assert!((z - depth).abs() <= 1e-4 * depth, "{name}, {quality}, pixel {i}: {z}, not {depth}");
                 count += 1;
+                reused += usize::from([1.0, 2.0, 9.0].contains(&layers.at("pixelClass.id", i)));
             }
             assert!(count > 10_000, "{name}: {count} pixels show a surface");
+            assert!(quality == "full" || reused > 10_000, "{name}, {quality}: {reused} pixels are reused");
         }
     }
 }
@@ -129,8 +141,7 @@ fn warped(
         if next.at("objectId.id", pixel) == object && near {
             visible += 1;
             tagged += usize::from(object == tag);
-            // A reused sample may lie half a pixel from its pixel's centre on both axes.
-            right += usize::from((landed - next.raster(there)).abs().max_element() <= 0.5);
+            right += usize::from((landed - next.raster(there)).length() <= 0.5);
         }
     }
     (right as f64 / visible as f64, tagged)
@@ -143,15 +154,18 @@ fn motion_carries_a_frame_onto_the_next_and_back_where_objects_move() {
     let place = |i: usize| [0.15 * i as f32, 0.0, 0.1 * i as f32];
     stage.translate(CARD, &(0..4).map(place).collect::<Vec<_>>());
     let scene = stage.write(&folder.path().join("s.gltf"));
-    run(&scene, &out, "-r 640x360 -q full -f 1-2 --aov motion,position,object,depth").ok();
-    let [now, next] = [1, 2].map(|n| Layers::read(&out.join(format!("s.{n:04}.exr"))));
     // The floor is the first node with a mesh, the card the second.
     let card = 2.0;
     let moved = |object: f32| if object == card { Vec3::new(0.15, 0.0, 0.1) } else { Vec3::ZERO };
-    for (from, to, sign, layer) in [(&now, &next, 1.0, "forward"), (&next, &now, -1.0, "backward")] {
-        let (share, cards) = warped(from, to, sign, layer, card, |object| moved(object) * sign);
-        assert!(share >= 0.999, "{layer}: {share}");
-        assert!(cards > 5_000, "{layer}: {cards} pixels of the card are visible in both");
+    for quality in ["full", "centred"] {
+        let out = out.join(quality);
+        run(&scene, &out, &format!("-r 640x360 -q {quality} -f 1-2 --aov motion,position,object,depth")).ok();
+        let [now, next] = [1, 2].map(|n| Layers::read(&out.join(format!("s.{n:04}.exr"))));
+        for (from, to, sign, layer) in [(&now, &next, 1.0, "forward"), (&next, &now, -1.0, "backward")] {
+            let (share, cards) = warped(from, to, sign, layer, card, |object| moved(object) * sign);
+            assert!(share >= 0.999, "{quality}, {layer}: {share}");
+            assert!(cards > 5_000, "{quality}, {layer}: {cards} pixels of the card are visible in both");
+        }
     }
 }
 
@@ -159,6 +173,8 @@ fn motion_carries_a_frame_onto_the_next_and_back_where_objects_move() {
 fn motion_carries_inferred_frames_onto_the_next() {
     let (_folder, out) = fresh();
     run(&courtyard(), &out, "-r 320x180 -f 70-73 --aov motion,position,object,depth").ok();
+    let report = json(&out.join("report.70-73.json"));
+    assert!(report["totals"]["inferred_frames"].as_i64().unwrap() >= 3, "{}", report["totals"]);
     let frames: Vec<Layers> =
         (70..=73).map(|n| Layers::read(&out.join(format!("courtyard.{n:04}.exr")))).collect();
     for pair in frames.windows(2) {

@@ -14,7 +14,8 @@ fn the_figures_are_those_of_separate_runs() {
     let (scene, small) = (courtyard(), ["-r", "64x36", "-f", "0-40"]);
     let scene_text = scene.to_str().unwrap();
     let done = trade(&[&[scene_text, out.to_str().unwrap(), "-j", "2"], &small[..]].concat()).ok();
-    assert_eq!(listing(&out), ["trade.csv", "trade.html", "trade.json"]);
+    assert_eq!(listing(&out), ["trade.csv", "trade.html", "trade.json", "trade.txt"]);
+    assert_eq!(std::fs::read_to_string(out.join("trade.txt")).unwrap(), done.out);
     let trade = json(&out.join("trade.json"));
     assert_eq!(trade["schema"], "buzz-trade/1");
     let qualities = trade["qualities"].as_array().unwrap();

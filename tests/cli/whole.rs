@@ -64,8 +64,11 @@ fn pixels_and_rays_add_up() {
         let pixels = frame["pixels"].as_object().unwrap();
         assert_eq!(pixels.values().map(number).sum::<u64>(), PIXELS);
         let reused: u64 = ["good", "overlapped", "filled"].iter().map(|c| number(&pixels[*c])).sum();
-        assert_eq!(number(&frame["rays"]["primary"]) + number(&frame["rays"]["visibility"]), PIXELS - reused);
+        assert_eq!(number(&frame["rays"]["primary"]), PIXELS - reused);
+        // One pixel in 64, on a grid of 12 x 7.
+        assert!(number(&frame["rays"]["visibility"]) <= 12 * 7);
         if frame["kind"] == "traced" {
+            assert_eq!(number(&frame["rays"]["visibility"]), 0);
             assert_eq!(number(&pixels["traced"]), PIXELS);
             assert!(frame["from"].is_null());
         } else {
