@@ -2,12 +2,14 @@
 
 mod aov;
 mod class;
+mod light_way;
 mod quality;
 mod sample;
 mod stats;
 
 pub use aov::{Aov, AovSet, Frame, FrameKind, Matte, Window};
 pub use class::PixelClass;
+pub use light_way::{LightWay, Way};
 pub use quality::Quality;
 pub use sample::{PackedNormal, SurfaceRef, SurfaceSample};
 pub use stats::{FrameStats, RayCounts, StageSeconds};

@@ -15,6 +15,7 @@
 //! | L, C, C1, (endx, endy), int_z | `Line` in `obscured.rs` |
 //! | test_z | in [`creeping()`] |
 //! | P, k | [`entering()`] |
+//! | moving objects, voxels; moving and variable lights | [`Motion`], [`Voxels`] |
 //! | (not in the paper) samples at pixel centres, shadows' edges followed | [`Centring`] |
 
 mod around;
@@ -22,22 +23,27 @@ mod buzz_buffer;
 mod centre;
 mod creeping;
 mod entering;
+mod moved;
 mod obscured;
 mod project;
 mod shadow_edges;
+mod voxels;
 
 pub use around::Trust;
 pub use buzz_buffer::{BuzzBuffer, CastRays, Projected, Projector, UNKNOWN};
 pub use centre::{CastCentres, Centring};
 pub use creeping::{Along, creeping};
 pub use entering::entering;
+pub use moved::{Body, Motion};
 pub use obscured::obscured;
 pub use project::{Landings, gather, project};
+pub use voxels::Voxels;
 
 use crate::frame::{PixelClass, RayCounts};
 use crate::scene::View;
 use creeping::forget_creeping;
 use glam::DVec3;
+use moved::{moved, relight, ride};
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicU8, AtomicU64, Ordering::Relaxed};
 use std::time::{Duration, Instant};
@@ -49,6 +55,8 @@ pub struct Inference {
     landings: Landings,
     marks: Marks,
     centring: Centring,
+    /// The old samples where their surfaces are now; used only where something moves.
+    now: BuzzBuffer,
 }
 
 /// What inferring a frame took.
@@ -79,7 +87,8 @@ impl Inference {
     ) -> Cost {
         let to = Projector::new(new_view, origin);
         let mut cost = Cost::default();
-        self.reproject(old, old_view, new_view, origin);
+        self.reproject(old, old_view, new_view, origin, rays.motion());
+        let old = if rides(rays.motion()) { &self.now } else { old };
         gather(old, &self.landings, &self.marks, new);
 
         // Ray-cast the positions that nothing explains, then the gaps that opened inside objects.
@@ -88,6 +97,9 @@ impl Inference {
             creeping(new, &self.landings, along, &self.marks);
             forget_creeping(new, &self.marks);
             cost.add(|| new.cast_unknown(&to, rays));
+        }
+        if let Some(motion) = rays.motion() {
+            cost.add(|| relight(new, motion));
         }
         cost
     }
@@ -103,7 +115,8 @@ impl Inference {
     ) -> Cost {
         let to = Projector::new(new_view, origin);
         let mut cost = Cost::default();
-        self.reproject(old, old_view, new_view, origin);
+        self.reproject(old, old_view, new_view, origin, rays.motion());
+        let old = if rides(rays.motion()) { &self.now } else { old };
 
         // Centre what lies within surfaces; cast rays at edges, at what nothing explains, and along shadows' edges.
         self.centring.recentre(old, (&self.landings, &self.marks), &to, rays, trust, new);
@@ -111,8 +124,16 @@ impl Inference {
         cost
     }
 
-    /// Finds which old sample each new pixel shows, and where that is not to be believed.
-    fn reproject(&mut self, old: &BuzzBuffer, old_view: &View, new_view: &View, origin: DVec3) {
+    /// Finds which old sample each new pixel shows, and where that is not to be believed. Where something has moved, `now`
+    /// are the old samples after it.
+    fn reproject(
+        &mut self,
+        old: &BuzzBuffer,
+        old_view: &View,
+        new_view: &View,
+        origin: DVec3,
+        motion: Option<&dyn Motion>,
+    ) {
         let (landings, marks) = (&mut self.landings, &mut self.marks);
         let (from, to) = (Projector::new(old_view, origin), Projector::new(new_view, origin));
 
@@ -120,8 +141,14 @@ impl Inference {
         landings.clear(old.object.len());
         marks.clear(old.object.len());
 
+        // Samples ride on the surfaces that moved.
+        if let Some(motion) = motion.filter(|_| rides(motion)) {
+            ride(old, motion, &mut self.now);
+        }
+        let now = if rides(motion) { &self.now } else { old };
+
         // Project the old pixels; the nearest hit wins.
-        let nearest = project(old, &to, landings, marks);
+        let nearest = project(now, &to, landings, marks);
 
         // Clear what the line L behind an old hit could be hiding.
         obscured(old, &from, &to, landings, marks);
@@ -130,7 +157,17 @@ impl Inference {
         if let Some(k) = nearest {
             entering(old_view, new_view, f64::from(k), marks);
         }
+
+        // Clear what something that moved stands before.
+        if let Some(motion) = motion {
+            moved(now, &to, motion, landings, marks);
+        }
     }
+}
+
+/// True if any sample may have moved with its surface.
+fn rides(motion: Option<&dyn Motion>) -> bool {
+    motion.is_some_and(|motion| !motion.bodies().is_empty())
 }
 
 impl Cost {
@@ -165,6 +202,11 @@ impl Marks {
         Some(Self::RANKS[rank as usize])
     }
 
-    const RANKS: [PixelClass; 4] =
-        [PixelClass::Overlapped, PixelClass::Bad, PixelClass::Entering, PixelClass::Creeping];
+    const RANKS: [PixelClass; 5] = [
+        PixelClass::Overlapped,
+        PixelClass::Bad,
+        PixelClass::Moved,
+        PixelClass::Entering,
+        PixelClass::Creeping,
+    ];
 }

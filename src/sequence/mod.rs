@@ -2,6 +2,8 @@
 //!
 //! [`camera_path`] gives the planner what it asks for, [`crate::plan::plan`] decides, [`render_sequence`] renders.
 
+mod caster;
+mod motion;
 mod path;
 mod resolve;
 
@@ -10,14 +12,14 @@ pub use path::camera_path;
 
 use crate::accel::Accel;
 use crate::error::{Error, Result};
-use crate::frame::{
-    Aov, AovSet, Frame, FrameKind, FrameStats, PixelClass, RayCounts, StageSeconds, SurfaceSample, Window,
-};
-use crate::infer::{BuzzBuffer, CastCentres, CastRays, Inference, Projector, Trust};
+use crate::frame::{Aov, AovSet, Frame, FrameKind, FrameStats, PixelClass, StageSeconds, Window};
+use crate::infer::{BuzzBuffer, Inference, Projector, Trust};
 use crate::plan::{Plan, Segment};
 use crate::scene::{Pose, Scene, View};
-use crate::trace::{TraceOptions, Tracer};
+use crate::trace::{TraceOptions, Tracer, lit_words};
+use caster::{Caster, mix};
 use glam::DVec3;
+use motion::SceneMotion;
 use resolve::{MatteNames, Neighbour, Resolver, count_hidden, empty_frame};
 use std::collections::BTreeSet;
 use std::time::Instant;
@@ -193,37 +195,40 @@ fn render_segment(
     sink: &mut dyn FrameSink,
     observer: &mut dyn Observer,
 ) -> Result<()> {
-    // Nothing but the camera moves within a segment, so the key frame's pose holds for all of it.
-    let pose = scene.pose(scene.timing.time_of(segment.key));
-    let origin = shot(scene, settings, segment.key).view.eye;
-    accel.place(scene, &pose, origin);
-    let accel = &*accel;
-    let tracer = Tracer::new(scene, accel, &pose, settings.trace_options());
-    buffers.fit(settings.window, tracer.lit_words());
+    let key_shot = shot(scene, settings, segment.key);
+    let origin = key_shot.view.eye;
+    buffers.fit(settings.window, lit_words(scene, settings.trace_options()));
     let names = settings.aovs.contains(Aov::Crypto).then(|| MatteNames::of(scene));
-    let mut emitter =
-        Emitter { scene, settings, accel, tracer: &tracer, origin, cuts, wanted, names, sink, observer };
+    let mut emitter = Emitter { scene, settings, segment, origin, cuts, wanted, names, sink, observer };
     let Buffers { key, old, new, inference } = buffers;
 
-    let key_shot = shot(scene, settings, segment.key);
+    accel.place(scene, &key_shot.pose, origin);
+    let tracer = Tracer::new(scene, accel, &key_shot.pose, settings.trace_options());
     let start = Instant::now();
     key.forget(PixelClass::Traced);
-    let rays = key
-        .cast_unknown(&Projector::new(&key_shot.view, origin), &emitter.caster(&key_shot.view, segment.key));
+    let caster = emitter.caster(&tracer, &key_shot, None);
+    let rays = key.cast_unknown(&Projector::new(&key_shot.view, origin), &caster);
     let mut stats = FrameStats { rays, ..FrameStats::default() };
     stats.seconds.trace = start.elapsed().as_secs_f64();
-    emitter.emit(segment.key, FrameKind::Traced, &key_shot, key, stats)?;
+    emitter.emit((accel, &tracer), &key_shot, key, stats)?;
 
     // Outward, as far as a wanted frame lies.
     let before = wanted.first().copied().unwrap_or(segment.key)..segment.key;
     let after = segment.key + 1..=wanted.last().copied().unwrap_or(segment.key);
+    let mut placed = key_shot.pose;
     for frames in [before.rev().collect::<Vec<_>>(), after.collect()] {
         let mut from = shot(scene, settings, segment.key);
         for (i, &number) in frames.iter().enumerate() {
             let to = shot(scene, settings, number);
             let source = if i == 0 { &*key } else { &*old };
             let start = Instant::now();
-            let caster = emitter.caster(&to.view, number);
+            if !scene.surfaces_alike(&placed, &to.pose) {
+                accel.place(scene, &to.pose, origin);
+                placed.clone_from(&to.pose);
+            }
+            let tracer = Tracer::new(scene, accel, &to.pose, settings.trace_options());
+            let motion = SceneMotion::between(scene, accel, &tracer, (&from.pose, &to.pose), &to.view);
+            let caster = emitter.caster(&tracer, &to, motion.as_ref());
             let (source, target) = ((source, &from.view), (&mut *new, &to.view));
             let cost = match settings.quality {
                 Quality::Full | Quality::HalfPixel => inference.infer(source, target, origin, &caster),
@@ -235,7 +240,7 @@ fn render_segment(
             let mut stats = FrameStats { rays: cost.rays, ..FrameStats::default() };
             stats.seconds.trace = cost.tracing.as_secs_f64();
             stats.seconds.infer = start.elapsed().as_secs_f64() - stats.seconds.trace;
-            emitter.emit(number, segment.kind(number), &to, new, stats)?;
+            emitter.emit((accel, &tracer), &to, new, stats)?;
             std::mem::swap(old, new);
             from = to;
         }
@@ -245,6 +250,7 @@ fn render_segment(
 
 /// The camera at a frame: the rendered window as a view of its own, and the whole image.
 struct Shot {
+    frame: i64,
     camera: usize,
     view: View,
     full_view: View,
@@ -255,74 +261,14 @@ fn shot(scene: &Scene, settings: &Settings, frame: i64) -> Shot {
     let pose = scene.pose(scene.timing.time_of(frame));
     let camera = scene.camera_at(frame, settings.camera);
     let full_view = scene.view(&pose, camera, settings.width, settings.height);
-    Shot { camera, view: full_view.cropped(settings.window), full_view, pose }
-}
-
-/// The tracer as inference wants it.
-struct Caster<'a> {
-    tracer: &'a Tracer<'a>,
-    view: &'a View,
-    observer: &'a dyn Observer,
-    /// See [`Settings::jitter`]; differs from frame to frame.
-    jitter: Option<u64>,
-}
-
-impl CastRays for Caster<'_> {
-    fn is_cancelled(&self) -> bool {
-        self.observer.stop_requested().is_some()
-    }
-
-    fn cast(&self, x: usize, y: usize, lit: &mut [u32], counts: &mut RayCounts) -> SurfaceSample {
-        let offset = self.jitter.map_or([0.5; 2], |seed| {
-            let bits = mix(seed ^ ((y as u64) << 32 | x as u64));
-            [bits as u32, (bits >> 32) as u32].map(|b| f64::from(b) / (f64::from(u32::MAX) + 1.0))
-        });
-        self.tracer.cast(self.view, x as f64 + offset[0], y as f64 + offset[1], lit, counts)
-    }
-}
-
-impl CastCentres for Caster<'_> {
-    fn hit(&self, x: usize, y: usize, counts: &mut RayCounts) -> SurfaceSample {
-        self.tracer.hit(self.view, x as f64 + 0.5, y as f64 + 0.5, counts)
-    }
-
-    fn recast(&self, sample: &SurfaceSample, ask: &[u32], lit: &mut [u32], counts: &mut RayCounts) {
-        self.tracer.recast(sample, ask, lit, counts);
-    }
-
-    fn differ(&self, a: &[u32], b: &[u32], differ: &mut [u32]) {
-        self.tracer.differ(a, b, differ);
-    }
-
-    fn nearest_of(
-        &self,
-        x: usize,
-        y: usize,
-        candidates: impl Iterator<Item = SurfaceSample>,
-    ) -> Option<SurfaceSample> {
-        self.tracer.nearest_of(self.view, x as f64 + 0.5, y as f64 + 0.5, candidates)
-    }
-
-    fn is_hidden(&self, sample: &SurfaceSample, counts: &mut RayCounts) -> bool {
-        counts.visibility += 1;
-        self.tracer.is_hidden(self.view, sample)
-    }
-}
-
-/// Scatters the bits of a number (SplitMix64's finaliser).
-fn mix(n: u64) -> u64 {
-    let n = n.wrapping_add(0x9e37_79b9_7f4a_7c15);
-    let n = (n ^ n >> 30).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-    let n = (n ^ n >> 27).wrapping_mul(0x94d0_49bb_1331_11eb);
-    n ^ n >> 31
+    Shot { frame, camera, view: full_view.cropped(settings.window), full_view, pose }
 }
 
 /// Turns samples into frames and hands them over.
 struct Emitter<'a> {
     scene: &'a Scene,
     settings: &'a Settings,
-    accel: &'a Accel,
-    tracer: &'a Tracer<'a>,
+    segment: &'a Segment,
     origin: DVec3,
     cuts: &'a [i64],
     wanted: &'a BTreeSet<i64>,
@@ -332,21 +278,26 @@ struct Emitter<'a> {
 }
 
 impl Emitter<'_> {
-    fn caster<'a>(&'a self, view: &'a View, frame: i64) -> Caster<'a> {
-        let jitter = self.settings.jitter.map(|seed| mix(seed ^ frame as u64));
-        Caster { tracer: self.tracer, view, observer: &*self.observer, jitter }
+    fn caster<'a>(
+        &'a self,
+        tracer: &'a Tracer<'a>,
+        shot: &'a Shot,
+        motion: Option<&'a SceneMotion<'a>>,
+    ) -> Caster<'a> {
+        let jitter = self.settings.jitter.map(|seed| mix(seed ^ shot.frame as u64));
+        Caster { tracer, view: &shot.view, observer: &*self.observer, jitter, motion }
     }
 
     /// Finishes a frame, unless the user asked to stop: then its samples may be missing, and it is dropped.
     fn emit(
         &mut self,
-        number: i64,
-        kind: FrameKind,
+        (accel, tracer): (&Accel, &Tracer<'_>),
         shot: &Shot,
         buffer: &BuzzBuffer,
         mut stats: FrameStats,
     ) -> Result<()> {
         go_on(self.observer)?;
+        let (number, kind) = (shot.frame, self.segment.kind(shot.frame));
         if self.wanted.contains(&number) {
             let start = Instant::now();
             stats.pixels = buffer.count_classes();
@@ -358,18 +309,18 @@ impl Emitter<'_> {
             let resolver = Resolver {
                 scene: self.scene,
                 settings: self.settings,
-                tracer: self.tracer,
+                tracer,
                 observer: &*self.observer,
                 origin: self.origin,
                 shot,
-                next: self.neighbour(shot, number + 1, self.cuts.contains(&(number + 1))),
-                previous: self.neighbour(shot, number - 1, self.cuts.contains(&number)),
+                next: self.neighbour(accel, shot, number + 1, self.cuts.contains(&(number + 1))),
+                previous: self.neighbour(accel, shot, number - 1, self.cuts.contains(&number)),
                 names: self.names.as_ref(),
             };
             stats.rays += resolver.resolve(buffer, &mut frame);
             stats.seconds.enhance = start.elapsed().as_secs_f64();
             if self.settings.audit {
-                stats.hidden = Some(count_hidden(self.tracer, &*self.observer, &shot.view, buffer));
+                stats.hidden = Some(count_hidden(tracer, &*self.observer, &shot.view, buffer));
             }
             go_on(self.observer)?;
             frame.stats = stats;
@@ -380,14 +331,14 @@ impl Emitter<'_> {
     }
 
     /// The frame next to `shot`, for motion; none across a cut or outside the range.
-    fn neighbour(&self, shot: &Shot, number: i64, is_cut: bool) -> Option<Neighbour> {
+    fn neighbour(&self, accel: &Accel, shot: &Shot, number: i64, is_cut: bool) -> Option<Neighbour> {
         let timing = &self.scene.timing;
         let wanted = self.settings.aovs.contains(Aov::Motion) && !is_cut;
         let inside = (timing.first..=timing.last).contains(&number);
         let other = (wanted && inside).then(|| self::shot(self.scene, self.settings, number));
         other.filter(|o| o.camera == shot.camera).map(|o| {
-            let moved = !self.scene.looks_alike(&shot.pose, &o.pose);
-            Neighbour { view: o.view, surfaces: moved.then(|| self.accel.displaced(self.scene, &o.pose)) }
+            let moved = !self.scene.surfaces_alike(&shot.pose, &o.pose);
+            Neighbour { view: o.view, surfaces: moved.then(|| accel.displaced(self.scene, &o.pose)) }
         })
     }
 }
