@@ -15,7 +15,7 @@ import motion
 
 SCENES = Path(__file__).resolve().parent
 MIB = 1 << 20
-LARGEST = {"courtyard": 4 * MIB, "gallery": 4 * MIB, "buzz-city": 1 * MIB}
+LARGEST = {"courtyard": 4 * MIB, "gallery": 4 * MIB, "buzz-city": 1 * MIB, "stage": 1 * MIB}
 
 
 @pytest.fixture(scope="module")

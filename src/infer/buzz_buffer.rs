@@ -315,11 +315,12 @@ impl Projector {
         if self.perspective { position - self.eye } else { self.forward }
     }
 
-    /// The line on which the sample is seen, before it: from where, along what, and how many times as far.
+    /// The line on which the sample is seen, from it to the eye or the other way: from where, along what, how many times as
+    /// far. It begins at the sample, but for the background.
     pub(super) fn line_to(&self, sample: &SurfaceSample) -> (Vec3, Vec3, f32) {
         match (self.perspective, sample.surface.is_background()) {
             (true, true) => (self.eye, sample.position, f32::INFINITY),
-            (true, false) => (self.eye, sample.position - self.eye, 1.0),
+            (true, false) => (sample.position, self.eye - sample.position, 1.0),
             (false, _) => (sample.position, -self.forward, f32::INFINITY),
         }
     }

@@ -2,9 +2,8 @@
 //!
 //! A sample rides on its surface: before anything is projected, samples of what has moved are put where their points are
 //! now. What moved in front of other samples is found by voxels: those that a moved surface is in now are *entered*, those
-//! that it was in before are *left*. A line from a sample to the eye through an entered voxel clears the pixel, unless the
-//! voxel was entered by the body that carries the sample itself: what a body hides of itself, the lines L know. A line from
-//! a sample to a light through an entered voxel, where the light had arrived, or through one that was left, where it had not,
+//! that it was in before are *left*. A line from a sample to the eye through an entered voxel clears the pixel; voxels that
+//! the body which carries the sample has entered count once the line has come out of them. A line from a sample to a light through an entered voxel, where the light had arrived, or through one that was left, where it had not,
 //! lets that light's ray be cast anew.
 //!
 //! Departure: the paper stores t for each light, up to which its shadow ray is known to be free, to walk no further. We
@@ -83,8 +82,11 @@ pub(super) fn moved(
                 continue;
             }
             let own = motion.body_of(&sample);
-            let mut others = bodies.iter().enumerate().filter(|(number, _)| own != Some(*number));
-            if others.any(|(_, body)| body.entered.are_crossed(from, direction, until)) {
+            let stands_before = |(number, body): (usize, &Body)| match own {
+                Some(own) if own == number => body.entered.are_crossed_again(from, direction, until),
+                _ => body.entered.are_crossed(from, direction, until),
+            };
+            if bodies.iter().enumerate().any(stands_before) {
                 marks.set(pixel, PixelClass::Moved);
             }
         }

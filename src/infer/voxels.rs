@@ -95,6 +95,16 @@ impl Voxels {
     /// True if the line from `from` along `direction`, up to `until` times as far (which may be infinite), passes through a
     /// marked voxel.
     pub fn are_crossed(&self, from: Vec3, direction: Vec3, until: f32) -> bool {
+        self.walk(from, direction, until, false)
+    }
+
+    /// The same of a line that begins on the surface itself: voxels that are marked all the way from there do not count.
+    pub fn are_crossed_again(&self, from: Vec3, direction: Vec3, until: f32) -> bool {
+        self.walk(from, direction, until, true)
+    }
+
+    /// Walks the voxels on a line until one is marked, once `inside` has been left.
+    fn walk(&self, from: Vec3, direction: Vec3, until: f32, mut inside: bool) -> bool {
         let Some((begin, end)) = clip((self.min, self.max), from, direction, until) else { return false };
         if self.is_empty() {
             return false;
@@ -112,9 +122,11 @@ impl Voxels {
         let mut next = leaves;
         loop {
             let bit = self.bit(voxel.as_uvec3());
-            if self.bits[bit / 64] >> (bit % 64) & 1 != 0 {
+            let marked = self.bits[bit / 64] >> (bit % 64) & 1 != 0;
+            if marked && !inside {
                 return true;
             }
+            inside &= marked;
             let axis = next.min_position();
             if next[axis] > end - begin {
                 return false;
