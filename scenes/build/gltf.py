@@ -161,7 +161,7 @@ class Scene:
         return self._add("accessors", accessor)
 
     def skin(self, mesh, joints, inverse_binds, indices, weights):
-        """Binds the only primitive of `mesh` to nodes, with four joints and weights a vertex; returns the skin's index."""
+        """Binds the only primitive of `mesh` to nodes, four joints and weights a vertex; returns the index."""
         (primitive,) = self.document["meshes"][mesh]["primitives"]
         primitive["attributes"] = {
             **primitive["attributes"],

@@ -44,7 +44,8 @@ def make_materials(scene):
     edge, tone = courses(256, 8, 2, seed=31, jitter=0.5)
     fibre = noise(256, 4, seed=32, octaves=4, stretch=16)
     board = smoothstep(0.0005, 0.004, edge)
-    planks = mix(ramp(0.5 * tone + 0.5 * fibre, (0.22, 0.13, 0.08), (0.48, 0.31, 0.19)) * 0.4, ramp(tone, (0.34, 0.21, 0.12), (0.56, 0.38, 0.24)), board)
+    wood = ramp(0.6 * tone + 0.4 * fibre, (0.26, 0.15, 0.09), (0.42, 0.26, 0.15), (0.60, 0.40, 0.25))
+    planks = mix(0.3 * wood, wood, board)
     return {
         "planks": scene.material(
             "Planks",
@@ -69,7 +70,9 @@ def stand_set(scene, materials):
     x = np.linspace(-WIDE, WIDE, 161)
     folds = np.column_stack([x, np.zeros_like(x), BACK + 0.3 + 0.12 * np.sin(6.0 * x)])
     curtain = mesh.strip(folds + [0, HIGH, 0], folds, smooth=True)
-    flats = join(box((s * 4.2 - 0.06, 0, z - 0.6), (s * 4.2 + 0.06, 3.4, z + 0.6)) for s in (-1, 1) for z in (-2.4, -0.2))
+    flats = join(
+        box((s * 4.2 - 0.06, 0, z - 0.6), (s * 4.2 + 0.06, 3.4, z + 0.6)) for s in (-1, 1) for z in (-2.4, -0.2)
+    )
     steps = join(box((2.2, 0, -3.2 + 0.35 * i), (3.9, 0.6 - 0.2 * i, -2.85 + 0.35 * i)) for i in range(3))
     profile = [(0.26, 0), (0.26, 0.12), (0.26, 0.12), (0.17, 0.18), (0.15, 2.1), (0.24, 2.2), (0.24, 2.2), (0.24, 2.3)]
     columns = join(lathe(profile, 32).moved((s * 3.3, 0, BACK + 1.0)) for s in (-1, 1))
@@ -119,7 +122,9 @@ def carousel(scene, materials):
     roof = lathe([(1.05, 1.65), (0.0, 2.05)], 8)
     rider = join([box((-0.22, 0.45, -0.08), (0.2, 0.68, 0.08)), box((0.14, 0.6, -0.06), (0.3, 0.92, 0.06))])
     riders = join(rider.moved((0, 0, 0.72)).moved(turn=turn) for turn in range(0, 360, 90))
-    poles = join(lathe([(0.02, 0.12), (0.02, 1.68)], 8).moved((0, 0, 0.72)).moved(turn=turn) for turn in range(0, 360, 90))
+    poles = join(
+        lathe([(0.02, 0.12), (0.02, 1.68)], 8).moved((0, 0, 0.72)).moved(turn=turn) for turn in range(0, 360, 90)
+    )
     parts = [(base, "wood"), (join([pole, poles]), "gold"), (roof, "blue"), (riders, "white")]
     part = scene.mesh("Carousel", *((surface, materials[name]) for surface, name in parts))
     node = scene.node("Carousel", (-1.7, 0, -1.3), mesh=part)
@@ -146,7 +151,12 @@ def banner(scene, materials):
     columns, rows = 12, 24
     u, v = np.meshgrid(np.linspace(0, 1, columns + 1), np.linspace(0, 1, rows + 1), indexing="ij")
     positions = np.column_stack([0.9 * (u.ravel() - 0.5), -BANNER * v.ravel(), 0 * u.ravel()])
-    cloth = Surface(positions, np.tile([0.0, 0.0, 1.0], (len(positions), 1)), np.column_stack([u.ravel(), v.ravel()]), mesh.grid_triangles(columns, rows))
+    cloth = Surface(
+        positions,
+        np.tile([0.0, 0.0, 1.0], (len(positions), 1)),
+        np.column_stack([u.ravel(), v.ravel()]),
+        mesh.grid_triangles(columns, rows),
+    )
     part = scene.mesh("Banner", (cloth, materials["cloth"]))
     step, nodes, parent = BANNER / BONES, [], None
     for i in range(BONES):

@@ -69,9 +69,11 @@ pub struct Cost {
 }
 
 impl Inference {
-    /// The most that it holds for each pixel, where a pixel has so many words of shadow bits.
-    pub fn bytes_per_pixel(words: usize) -> usize {
-        size_of::<AtomicU64>() + size_of::<AtomicU8>() + Centring::bytes_per_pixel(words)
+    /// The most that it holds for each pixel, where a pixel has so many words of shadow bits, and where something in the
+    /// scene moves or nothing does.
+    pub fn bytes_per_pixel(words: usize, moves: bool) -> usize {
+        let now = if moves { BuzzBuffer::bytes_per_pixel(words) } else { 0 };
+        size_of::<AtomicU64>() + size_of::<AtomicU8>() + Centring::bytes_per_pixel(words) + now
     }
 
     /// Makes `new`, the samples of `new_view`, from `old`, those of `old_view`. Positions are relative to `origin`.

@@ -20,13 +20,11 @@ pub struct Voxels {
 impl Voxels {
     /// Marks the voxels of `triangles`, which may be anywhere; those that are not finite are left out. `slack` says how
     /// far around a point its voxels are marked too, metres.
-    pub fn new(
-        triangles: impl Iterator<Item = [Vec3; 3]> + Clone,
-        slack: impl Fn(Vec3) -> f32,
-    ) -> Self {
+    pub fn new(triangles: impl Iterator<Item = [Vec3; 3]> + Clone, slack: impl Fn(Vec3) -> f32) -> Self {
         let around = |corners: [Vec3; 3]| {
             let slack = corners.map(&slack).into_iter().fold(0.0, f32::max);
-            let [min, max] = [Vec3::min, Vec3::max].map(|pick| corners.into_iter().reduce(pick).unwrap_or_default());
+            let [min, max] =
+                [Vec3::min, Vec3::max].map(|pick| corners.into_iter().reduce(pick).unwrap_or_default());
             (min - slack, max + slack, slack)
         };
         let triangles = triangles.filter(|corners| corners.iter().all(|c| c.is_finite()));
@@ -141,12 +139,7 @@ impl Voxels {
 }
 
 /// The part of a line that lies within a box, as multiples of `direction`; none where it passes by.
-pub(super) fn clip(
-    (min, max): (Vec3, Vec3),
-    from: Vec3,
-    direction: Vec3,
-    until: f32,
-) -> Option<(f32, f32)> {
+pub(super) fn clip((min, max): (Vec3, Vec3), from: Vec3, direction: Vec3, until: f32) -> Option<(f32, f32)> {
     // No number is 0 times what a line parallel to a side has instead of infinity.
     let zero = direction.cmpeq(Vec3::ZERO);
     let per = Vec3::select(zero, Vec3::splat(f32::MIN_POSITIVE), direction).recip();

@@ -154,8 +154,8 @@ pub fn plan(path: &[PathFrame], cuts: &[i64], options: PlanOptions) -> Plan {
 /// the scene says.
 ///
 /// # Errors
-/// What does not fit, in words: if the segments do not hold every frame of the path once and in order, or if something
-/// within one changes that nothing can be inferred across.
+/// What does not fit, in words: if the segments do not hold every frame of the path once and in order, or if one goes on
+/// after a cut.
 pub fn replay(
     path: &[PathFrame],
     named: &[i64],

@@ -41,9 +41,9 @@ pub struct ProbePoint {
 /// What happens to the image from one frame to the next, seen both ways.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Step {
-    /// Share of the later frame that the earlier one did not see.
+    /// Share of the later frame that the earlier one did not see, or saw somewhere else.
     pub new_forward: f64,
-    /// Share of the earlier frame that the later one does not see.
+    /// Share of the earlier frame that the later one does not see, or sees somewhere else.
     pub new_backward: f64,
     /// Mean distance in pixels that what both see moves on the image.
     pub pixels: f64,

@@ -59,8 +59,7 @@ impl Chain {
         (0..=steps.len())
             .map(|key| {
                 let mut after = steps[key..].iter().map(|s| (s.new_forward, s.pixels));
-                let mut before =
-                    steps[..key].iter().rev().map(|s| (s.new_backward, s.pixels));
+                let mut before = steps[..key].iter().rev().map(|s| (s.new_backward, s.pixels));
                 Self {
                     forward: predict(&mut after, others - others / 2),
                     backward: predict(&mut before, others / 2),

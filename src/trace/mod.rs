@@ -22,8 +22,8 @@ mod world;
 
 use crate::accel::{Accel, Ray, Sides};
 use crate::frame::{PackedNormal, RayCounts, SurfaceRef, SurfaceSample};
-pub use changes::LightChanges;
 use crate::scene::{Pose, Scene, View};
+pub use changes::LightChanges;
 use glam::Vec3;
 use interaction::{Beam, SurfaceInteraction};
 use light::Emitter;

@@ -5,4 +5,5 @@
 mod centred;
 mod five_pixels;
 mod half_pixel;
+mod moved;
 mod rig;
