@@ -16,7 +16,7 @@ import subprocess
 from pathlib import Path
 
 HERE = Path(__file__).resolve().parent
-SIZES = {"courtyard": "1280x720", "gallery": "1280x720", "buzz-city": "640x480"}
+SIZES = {"courtyard": "1280x720", "gallery": "1280x720", "buzz-city": "640x480", "stage": "1280x720"}
 INFERRED = ("half-pixel", "centred")
 HEADER = ["scene", "pixels", "quality", "frames", "traced in full", "rays saved", "all rays saved"]
 HEADER += ["PSNR mean", "worst", "wall s", "times as fast", "CPU s", "times less CPU"]

@@ -15,7 +15,7 @@ import motion
 
 SCENES = Path(__file__).resolve().parent
 MIB = 1 << 20
-LARGEST = {"courtyard": 4 * MIB, "gallery": 4 * MIB, "buzz-city": 1 * MIB}
+LARGEST = {"courtyard": 4 * MIB, "gallery": 4 * MIB, "buzz-city": 1 * MIB, "stage": 1 * MIB}
 
 
 @pytest.fixture(scope="module")
@@ -104,6 +104,27 @@ def test_courtyard_is_one_cut_and_96_frames():
     positions, cuts = seen_positions(*committed("courtyard"))
     assert len(positions) == 96
     assert cuts == [60]
+
+
+def test_stage_moves_all_that_inference_follows():
+    document, binary = committed("stage")
+    channels = [(a, c) for a in document["animations"] for c in a["channels"]]
+    moving = {path: 0 for path in ("translation", "rotation", "weights", "color", "intensity", "outerConeAngle")}
+    for animation, channel in channels:
+        pointer = channel["target"].get("extensions", {}).get("KHR_animation_pointer", {}).get("pointer", "")
+        path = channel["target"]["path"]
+        values = read(document, binary, animation["samplers"][channel["sampler"]]["output"])
+        moving[pointer.rsplit("/")[-1] or path] += len(np.unique(values, axis=0)) > 1
+    assert all(moving.values()), moving
+    (skin,) = document["skins"]
+    moved = {c["target"].get("node") for _, c in channels}
+    assert moved.issuperset(skin["joints"])
+    # A light hangs from what swings, and two stand still.
+    lit = [i for i, node in enumerate(document["nodes"]) if "KHR_lights_punctual" in node.get("extensions", {})]
+    carried = [i for node in moved - {None} for i in document["nodes"][node].get("children", []) if i in lit]
+    assert (len(lit), len(carried)) == (4, 1)
+    positions, cuts = seen_positions(document, binary)
+    assert (len(positions), cuts) == (96, [])
 
 
 # ---- buzz-city

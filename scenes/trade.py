@@ -19,7 +19,7 @@ import interpolate
 
 ROOT = Path(__file__).resolve().parent.parent
 WALKS = ROOT.parent / "shared" / "scenes" / "walk"
-SCENES = {name: ROOT / "scenes" / name / f"{name}.gltf" for name in ("courtyard", "gallery", "buzz-city")}
+SCENES = {name: ROOT / "scenes" / name / f"{name}.gltf" for name in ("courtyard", "gallery", "buzz-city", "stage")}
 SCENES |= {
     "breakfast_dolly": WALKS / "breakfast_dolly" / "breakfast_dolly.gltf",
     "gas_station_orbit_cut_whip": WALKS / "gas_station_orbit_cut_whip.glb",

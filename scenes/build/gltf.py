@@ -172,10 +172,42 @@ class Scene:
         self._require("BUZZ_analytic_shape")
         return {"BUZZ_analytic_shape": {"shape": shape, "material": material}}
 
+    def skin(self, mesh, joints, inverse_binds, indices, weights):
+        """Binds the only primitive of `mesh` to nodes, four joints and weights a vertex; returns the index."""
+        (primitive,) = self.document["meshes"][mesh]["primitives"]
+        primitive["attributes"] = {
+            **primitive["attributes"],
+            "JOINTS_0": self._accessor(indices, "VEC4", USHORT, ARRAY_BUFFER),
+            "WEIGHTS_0": self._accessor(weights, "VEC4", FLOAT, ARRAY_BUFFER),
+        }
+        # Matrices are stored by columns.
+        columns = np.transpose(inverse_binds, (0, 2, 1)).reshape(len(joints), 16)
+        binds = self._accessor(columns, "MAT4", FLOAT)
+        return self._add("skins", {"joints": list(joints), "inverseBindMatrices": binds})
+
+    def morph(self, mesh, *targets):
+        """Gives the only primitive of `mesh` morph targets: surfaces of the same triangles."""
+        (primitive,) = self.document["meshes"][mesh]["primitives"]
+        position, normal = (primitive["attributes"][name] for name in ("POSITION", "NORMAL"))
+        primitive["targets"] = [
+            {
+                "POSITION": self._accessor(target.positions - self._values(position), "VEC3", FLOAT, bounds=True),
+                "NORMAL": self._accessor(target.normals - self._values(normal), "VEC3", FLOAT),
+            }
+            for target in targets
+        ]
+        self.document["meshes"][mesh]["weights"] = [0.0] * len(targets)
+
+    def _values(self, accessor):
+        """What has been stored of a VEC3 of floats."""
+        described = self.document["accessors"][accessor]
+        start = self.document["bufferViews"][described["bufferView"]]["byteOffset"]
+        return np.frombuffer(bytes(self.binary), "<f4", described["count"] * 3, start).reshape(-1, 3)
+
     # ---- nodes
 
-    def node(self, name, translation=(0, 0, 0), turn=0.0, rotation=None, scale=(1, 1, 1), **links):
-        """Adds a node to the scene, turned about Y by degrees or by a quaternion; `links` are mesh=, camera= ..."""
+    def node(self, name, translation=(0, 0, 0), turn=0.0, rotation=None, scale=(1, 1, 1), parent=None, **links):
+        """Adds a node, turned about Y by degrees or by a quaternion; `links` are mesh=, camera= ..."""
         node = {"name": name, **links}
         if any(translation):
             node["translation"] = _tidy(translation)
@@ -187,18 +219,21 @@ class Scene:
         if any(s != 1 for s in scale):
             node["scale"] = _tidy(scale)
         index = self._add("nodes", node)
-        self.document["scenes"][0]["nodes"].append(index)
+        siblings = self.document["scenes"][0]["nodes"]
+        if parent is not None:
+            siblings = self.document["nodes"][parent].setdefault("children", [])
+        siblings.append(index)
         return index
 
     def sun(self, name, direction, watts_per_m2, colour=(1, 1, 1), angle=0.0):
         """Adds a directional light that shines along `direction` and fills `angle` radians of the sky."""
         light = {"type": "directional", "intensity": LUMENS_PER_WATT * watts_per_m2, **_size("angle", angle)}
-        self._light(name, light, colour, rotation=_turn_minus_z_to(direction))
+        return self._light(name, light, colour, rotation=_turn_minus_z_to(direction))
 
-    def lamp(self, name, position, watts, colour=(1, 1, 1), radius=0.0):
+    def lamp(self, name, position, watts, colour=(1, 1, 1), radius=0.0, parent=None):
         """Adds a point light of so many watts, as Blender counts them; with a radius, a sphere."""
         light = {"type": "point", "intensity": LUMENS_PER_WATT * watts / (4 * np.pi), **_size("radius", radius)}
-        self._light(name, light, colour, translation=position)
+        return self._light(name, light, colour, translation=position, parent=parent)
 
     def spot(self, name, position, direction, watts, cone, colour=(1, 1, 1), radius=0.0):
         """Adds a spot of so many watts, as Blender counts them, with inner and outer half-angles in degrees."""
@@ -208,14 +243,14 @@ class Scene:
             "spot": dict(zip(("innerConeAngle", "outerConeAngle"), _tidy(np.radians(cone)), strict=True)),
             **_size("radius", radius),
         }
-        self._light(name, light, colour, translation=position, rotation=_turn_minus_z_to(direction))
+        return self._light(name, light, colour, translation=position, rotation=_turn_minus_z_to(direction))
 
     def _light(self, name, light, colour, **placing):
         self._require("KHR_lights_punctual")
         light["intensity"] = round(light["intensity"], 3)
         self.lights.append({"name": name, "color": _tidy(colour), **light})
         link = {"KHR_lights_punctual": {"light": len(self.lights) - 1}}
-        self.node(name, extensions=link, **placing)
+        return self.node(name, extensions=link, **placing)
 
     # ---- camera and animation
 
@@ -250,6 +285,27 @@ class Scene:
                 "world": world,
             }
         }
+
+    def animate(self, name, fps, tracks):
+        """Adds an animation with one LINEAR key a frame.
+
+        A track is (node, path, values), or for what is no node's (None, JSON pointer, values).
+        """
+        samplers, channels = [], []
+        keys = self._accessor(np.arange(self.frames) / fps, "SCALAR", FLOAT, bounds=True)
+        for node, path, values in tracks:
+            values = np.asarray(values, float)
+            # Weights are stored one by one, however many there are to a key.
+            scalar = path == "weights" or values.ndim == 1
+            kind = "SCALAR" if scalar else f"VEC{values.shape[1]}"
+            output = self._accessor(values.reshape(-1) if scalar else values, kind, FLOAT)
+            target = {"node": node, "path": path}
+            if node is None:
+                self._require("KHR_animation_pointer")
+                target = {"path": "pointer", "extensions": {"KHR_animation_pointer": {"pointer": path}}}
+            channels.append({"sampler": len(samplers), "target": target})
+            samplers.append({"input": keys, "output": output, "interpolation": "LINEAR"})
+        self._add("animations", {"name": name, "samplers": samplers, "channels": channels})
 
     # ---- results
 

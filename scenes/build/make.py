@@ -5,7 +5,7 @@ import sys
 from pathlib import Path
 
 #: Each name is a folder of `scenes/` and, with underscores, a module beside this file.
-SCENES = ("courtyard", "gallery", "buzz-city")
+SCENES = ("courtyard", "gallery", "buzz-city", "stage")
 
 
 def build(name):

@@ -3,8 +3,8 @@
 use super::deform::{Deformed, Shape, is_deformable};
 use super::{Accel, Placement, interpolate, place_group};
 use crate::frame::SurfaceRef;
-use crate::scene::{Pose, Scene};
-use glam::{Vec3, Vec3A};
+use crate::scene::{Mesh, Pose, Scene};
+use glam::{DVec3, Vec3, Vec3A};
 
 /// The scene's surfaces in another pose than the one that rays meet, in the same render space.
 pub struct Displaced {
@@ -27,19 +27,94 @@ impl Accel {
         });
         Displaced { placements, deformed: deformed.collect() }
     }
+
+    /// The triangles of an instance, relative to the origin; none of one that is not placed.
+    pub fn triangles<'a>(
+        &'a self,
+        scene: &'a Scene,
+        instance: usize,
+    ) -> impl Iterator<Item = [Vec3; 3]> + Clone + use<'a> {
+        let mesh = &scene.meshes[scene.instances[instance].mesh];
+        triangles(mesh, self.positions(instance, mesh), &self.placements[instance])
+    }
+}
+
+/// Triangles of an instance of `mesh` that stands at `placement`; of a shape, those of the box around it.
+fn triangles<'a>(
+    mesh: &'a Mesh,
+    positions: &'a [Vec3],
+    placement: &'a Placement,
+) -> impl Iterator<Item = [Vec3; 3]> + Clone + use<'a> {
+    let numbers = if placement.present { mesh.triangles.as_slice() } else { &[] };
+    let bounds = mesh.shape.as_ref().filter(|_| placement.present).map(|shape| shape.bounds());
+    let object = numbers.iter().map(|t| t.map(|i| positions[i as usize]));
+    let render_from_object = placement.render_from_object;
+    object
+        .chain(bounds.into_iter().flat_map(sides))
+        .map(move |t| t.map(|p| render_from_object.transform_point3(p)))
+}
+
+/// Farther away than this a shape without end is taken to end, metres: voxels around it are as coarse as its box is large.
+const ENDLESS: f64 = 1e6;
+
+/// The triangles of a box.
+fn sides(bounds: [DVec3; 2]) -> impl Iterator<Item = [Vec3; 3]> + Clone {
+    let bounds = bounds.map(|p| p.clamp(DVec3::splat(-ENDLESS), DVec3::splat(ENDLESS)).as_vec3());
+    let corner = move |i: usize| Vec3::new(bounds[i & 1].x, bounds[i >> 1 & 1].y, bounds[i >> 2].z);
+    let faces = [[0, 1, 2, 3], [4, 5, 6, 7], [0, 1, 4, 5], [2, 3, 6, 7], [0, 2, 4, 6], [1, 3, 5, 7]];
+    faces.into_iter().flat_map(|[a, b, c, d]| [[a, b, c], [b, c, d]]).map(move |t| t.map(corner))
 }
 
 impl Displaced {
     /// Where the surface point is, relative to the render space's origin. `surface` is not the background.
     pub fn point(&self, scene: &Scene, surface: SurfaceRef) -> Vec3 {
-        let index = surface.instance as usize;
-        let mesh = &scene.meshes[scene.instances[index].mesh];
+        let (index, mesh) = mesh_of(scene, surface);
+        let placement = &self.placements[index];
         if let Some(shape) = &mesh.shape {
-            return self.placements[index].render_from_object.transform_point3(shape.point(surface).0);
+            return placement.render_from_object.transform_point3(shape.point(surface).0);
         }
-        let positions = self.deformed[index].as_ref().map_or(&mesh.positions, |d| &d.positions);
-        let [a, b, c] =
-            mesh.triangles[surface.primitive as usize].map(|i| Vec3A::from(positions[i as usize]));
-        self.placements[index].render_from_object.transform_point3a(interpolate(a, b, c, surface)).into()
+        let [a, b, c] = self.corners(index, mesh, surface);
+        placement.render_from_object.transform_point3a(interpolate(a, b, c, surface)).into()
     }
+
+    /// Whether the front of the surface faces against `direction`. It is not the background.
+    pub fn is_front(&self, scene: &Scene, surface: SurfaceRef, direction: Vec3) -> bool {
+        let (index, mesh) = mesh_of(scene, surface);
+        let placement = &self.placements[index];
+        let outward = match &mesh.shape {
+            Some(shape) => placement.normals * Vec3A::from(shape.point(surface).1),
+            None => {
+                let [a, b, c] = self.corners(index, mesh, surface);
+                let edges = [b - a, c - a].map(|edge| placement.render_from_object.transform_vector3a(edge));
+                edges[0].cross(edges[1]) * placement.winding
+            }
+        };
+        outward.dot(Vec3A::from(direction)) <= 0.0
+    }
+
+    /// See [`Accel::triangles`].
+    pub fn triangles<'a>(
+        &'a self,
+        scene: &'a Scene,
+        instance: usize,
+    ) -> impl Iterator<Item = [Vec3; 3]> + Clone + use<'a> {
+        let mesh = &scene.meshes[scene.instances[instance].mesh];
+        triangles(mesh, self.positions(instance, mesh), &self.placements[instance])
+    }
+
+    /// Corners of the triangle that a point lies on, as the instance has them before it is placed.
+    fn corners(&self, index: usize, mesh: &Mesh, surface: SurfaceRef) -> [Vec3A; 3] {
+        let positions = self.positions(index, mesh);
+        mesh.triangles[surface.primitive as usize].map(|i| Vec3A::from(positions[i as usize]))
+    }
+
+    fn positions<'a>(&'a self, instance: usize, mesh: &'a Mesh) -> &'a [Vec3] {
+        self.deformed[instance].as_ref().map_or(&mesh.positions, |d| &d.positions)
+    }
+}
+
+/// The instance that a point lies on, and its mesh.
+fn mesh_of(scene: &Scene, surface: SurfaceRef) -> (usize, &Mesh) {
+    let index = surface.instance as usize;
+    (index, &scene.meshes[scene.instances[index].mesh])
 }

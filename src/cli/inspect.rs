@@ -21,14 +21,16 @@ pub fn run(args: InspectArgs) -> Result<ExitCode> {
 /// Stages that rendering the scene runs.
 fn stages(needs: &Requirements) -> Vec<&'static str> {
     let mut stages = vec!["trace", "project", "obscured", "entering", "creeping"];
-    let enhance = [
+    let others = [
+        (needs.moving_objects, "moved"),
+        (needs.changing_lights, "relight"),
         (needs.soft_lights, "soft-light"),
         (needs.textures, "texture"),
         (true, "highlights"),
         (needs.reflection, "reflection"),
         (needs.refraction, "refraction"),
     ];
-    stages.extend(enhance.into_iter().filter_map(|(needed, name)| needed.then_some(name)));
+    stages.extend(others.into_iter().filter_map(|(needed, name)| needed.then_some(name)));
     stages
 }
 

@@ -5,6 +5,7 @@ use anyhow::Result;
 use buzz::error::Error;
 use buzz::infer::{BuzzBuffer, Inference};
 use buzz::output::{ExrSink, peak_bytes};
+use buzz::scene::Requirements;
 use buzz::sequence::render_buffers;
 use buzz::trace::lit_words;
 
@@ -38,8 +39,9 @@ fn rendering(job: &Job) -> u64 {
     let (settings, scene) = (&job.settings, &job.scene);
     let lights = scene.lights.len();
     let words = lit_words(scene, settings.trace_options());
-    let inference =
-        render_buffers(settings) * BuzzBuffer::bytes_per_pixel(words) + Inference::bytes_per_pixel(words);
+    let moves = Requirements::of(scene).moving_objects;
+    let inference = render_buffers(settings) * BuzzBuffer::bytes_per_pixel(words)
+        + Inference::bytes_per_pixel(words, moves);
     // One frame is filled while others are encoded; a file is at most as large as the layers that it is made of.
     let frame = settings.aovs.bytes_per_pixel(lights);
     let frames = (ExrSink::IN_FLIGHT + 1) * frame + ExrSink::IN_FLIGHT * frame;

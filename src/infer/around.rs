@@ -55,7 +55,10 @@ impl Sources {
                     let flag = if is_at_centre(old, i, view, x, y) { 0 } else { MOVED };
                     i as u32 | flag
                 });
-                if matches!(marks.get(pixel), Some(PixelClass::Bad | PixelClass::Entering)) {
+                if matches!(
+                    marks.get(pixel),
+                    Some(PixelClass::Bad | PixelClass::Moved | PixelClass::Entering)
+                ) {
                     *source |= SUSPECT;
                 }
             }

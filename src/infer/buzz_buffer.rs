@@ -1,5 +1,6 @@
 //! The Buzzbuffer: a window-sized store of samples, the paper's data structure and its namesake.
 
+use super::moved::Motion;
 use crate::frame::{PackedNormal, PixelClass, RayCounts, SurfaceRef, SurfaceSample};
 use crate::scene::View;
 use glam::{DVec3, Mat4, Vec3};
@@ -89,6 +90,18 @@ impl BuzzBuffer {
     /// The shadow bits of pixel number `i`.
     pub fn lit(&self, i: usize) -> &[u32] {
         &self.lit[i * self.lit_words..][..self.lit_words]
+    }
+
+    /// Becomes the same as `other`, in the memory that it has.
+    pub(super) fn copy_from(&mut self, other: &Self) {
+        (self.width, self.height, self.lit_words) = (other.width, other.height, other.lit_words);
+        self.z.clone_from(&other.z);
+        self.position.clone_from(&other.position);
+        self.object.clone_from(&other.object);
+        self.surface.clone_from(&other.surface);
+        self.normal.clone_from(&other.normal);
+        self.lit.clone_from(&other.lit);
+        self.class.clone_from(&other.class);
     }
 
     /// Forgets everything: every pixel is wanted, as `class`.
@@ -217,6 +230,11 @@ pub trait CastRays: Sync {
     fn is_cancelled(&self) -> bool {
         false
     }
+
+    /// What differs beside the camera from the frame that is inferred from; by default nothing.
+    fn motion(&self) -> Option<&dyn Motion> {
+        None
+    }
 }
 
 /// The paper's four by four matrix and perspective division: where a stored hit lies in a view.
@@ -298,7 +316,7 @@ impl Projector {
     }
 
     /// Side of a pixel at a point's depth, metres.
-    pub(super) fn pixel_width(&self, position: Vec3) -> f32 {
+    pub fn pixel_width(&self, position: Vec3) -> f32 {
         let depth = if self.perspective { (position - self.eye).dot(self.forward).abs() } else { 1.0 };
         self.pixel * depth
     }
@@ -312,6 +330,16 @@ impl Projector {
     /// The direction in which a ray of this view passes through `position`; not normalised.
     pub(super) fn direction_to(&self, position: Vec3) -> Vec3 {
         if self.perspective { position - self.eye } else { self.forward }
+    }
+
+    /// The line on which the sample is seen, from it to the eye or the other way: from where, along what, how many times as
+    /// far. It begins at the sample, but for the background.
+    pub(super) fn line_to(&self, sample: &SurfaceSample) -> (Vec3, Vec3, f32) {
+        match (self.perspective, sample.surface.is_background()) {
+            (true, true) => (self.eye, sample.position, f32::INFINITY),
+            (true, false) => (sample.position, self.eye - sample.position, 1.0),
+            (false, _) => (sample.position, -self.forward, f32::INFINITY),
+        }
     }
 
     pub(super) fn raster_from_world(&self) -> &Mat4 {

@@ -17,6 +17,7 @@
 use super::Marks;
 use super::around::{Around, Sources, Trust, is_one_surface};
 use super::buzz_buffer::{BuzzBuffer, CastRays, Projector, Row, UNKNOWN};
+use super::moved::Askers;
 use super::project::Landings;
 use super::shadow_edges::ShadowEdges;
 use crate::frame::{PixelClass, RayCounts, SurfaceSample};
@@ -156,6 +157,7 @@ impl Centring {
     ) -> RayCounts {
         let (width, words) = (old.width(), old.lit_words());
         let sources = &self.sources;
+        let askers = rays.motion().map(Askers::new);
         let cast_row = |y: usize, mut row: Row<'_>, ask: &mut [u32]| {
             let mut counts = RayCounts::default();
             if rays.is_cancelled() {
@@ -180,10 +182,15 @@ impl Centring {
                         around.lend(&sample, rays, trust, row.lit_mut(x), ask);
                     }
                 }
+                // Its lights were asked when it was cast, or since.
+                let settled = sources.is_centred(pixel) && ask.iter().all(|&bits| bits == 0);
+                if let Some(askers) = &askers {
+                    askers.ask(&row.sample(x), row.lit_mut(x), ask);
+                }
                 if ask.iter().any(|&bits| bits != 0) {
                     rays.recast(&row.sample(x), ask, row.lit_mut(x), &mut counts);
-                } else if sources.is_centred(pixel) {
-                    // Its lights were asked when it was cast.
+                }
+                if settled {
                     ask.fill(u32::MAX);
                 }
             }

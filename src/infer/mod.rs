@@ -16,6 +16,7 @@
 //! | test_z | in [`creeping()`] |
 //! | P, k | [`entering()`] |
 //! | X + e z_p / (d + z_p) | [`Parallax`], [`other_eye()`] |
+//! | moving objects, voxels; moving and variable lights | [`Motion`], [`Voxels`] |
 //! | (not in the paper) samples at pixel centres, shadows' edges followed | [`Centring`] |
 
 mod around;
@@ -23,26 +24,31 @@ mod buzz_buffer;
 mod centre;
 mod creeping;
 mod entering;
+mod moved;
 mod obscured;
 mod project;
 mod shadow_edges;
 mod stereo;
 mod turned;
+mod voxels;
 
 pub use around::Trust;
 pub use buzz_buffer::{BuzzBuffer, CastRays, Projected, Projector, UNKNOWN};
 pub use centre::{CastCentres, Centring};
 pub use creeping::{Along, creeping};
 pub use entering::entering;
+pub use moved::{Body, Motion};
 pub use obscured::obscured;
 pub use project::{Landings, gather, project};
 pub use stereo::{Parallax, other_eye};
 pub use turned::turned;
+pub use voxels::Voxels;
 
 use crate::frame::{PixelClass, RayCounts};
 use crate::scene::View;
 use creeping::forget_creeping;
 use glam::DVec3;
+use moved::{moved, relight, ride};
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicU8, AtomicU64, Ordering::Relaxed};
 use std::time::{Duration, Instant};
@@ -54,6 +60,8 @@ pub struct Inference {
     landings: Landings,
     marks: Marks,
     centring: Centring,
+    /// The old samples where their surfaces are now; used only where something moves.
+    now: BuzzBuffer,
 }
 
 /// What lies between the old view and the new.
@@ -75,9 +83,11 @@ pub struct Cost {
 }
 
 impl Inference {
-    /// The most that it holds for each pixel, where a pixel has so many words of shadow bits.
-    pub fn bytes_per_pixel(words: usize) -> usize {
-        size_of::<AtomicU64>() + size_of::<AtomicU8>() + Centring::bytes_per_pixel(words)
+    /// The most that it holds for each pixel, where a pixel has so many words of shadow bits, and where something in the
+    /// scene moves or nothing does.
+    pub fn bytes_per_pixel(words: usize, moves: bool) -> usize {
+        let now = if moves { BuzzBuffer::bytes_per_pixel(words) } else { 0 };
+        size_of::<AtomicU64>() + size_of::<AtomicU8>() + Centring::bytes_per_pixel(words) + now
     }
 
     /// Makes `new`, the samples of `new_view`, from `old`, those of `old_view`. Positions are relative to `origin`.
@@ -95,6 +105,7 @@ impl Inference {
         let to = Projector::new(new_view, origin);
         let mut cost = Cost::default();
         self.reproject(by, old, old_view, new_view, origin, rays);
+        let old = if rides(rays.motion()) { &self.now } else { old };
         gather(old, &self.landings, &self.marks, new);
 
         // Ray-cast the positions that nothing explains, then the gaps that opened inside objects.
@@ -103,6 +114,9 @@ impl Inference {
             creeping(new, &self.landings, along, &self.marks);
             forget_creeping(new, &self.marks);
             cost.add(|| new.cast_unknown(&to, rays));
+        }
+        if let Some(motion) = rays.motion() {
+            cost.add(|| relight(new, motion));
         }
         cost
     }
@@ -120,6 +134,7 @@ impl Inference {
         let to = Projector::new(new_view, origin);
         let mut cost = Cost::default();
         self.reproject(by, old, old_view, new_view, origin, rays);
+        let old = if rides(rays.motion()) { &self.now } else { old };
 
         // Centre what lies within surfaces; cast rays at edges, at what nothing explains, and along shadows' edges.
         self.centring.recentre(old, (&self.landings, &self.marks), &to, rays, trust, new);
@@ -128,7 +143,8 @@ impl Inference {
         cost
     }
 
-    /// Finds which old sample each new pixel shows, and where that is not to be believed.
+    /// Finds which old sample each new pixel shows, and where that is not to be believed. Where something has moved, `now`
+    /// are the old samples after it.
     fn reproject(
         &mut self,
         by: Move,
@@ -145,10 +161,17 @@ impl Inference {
         landings.clear(old.object.len());
         marks.clear(old.object.len());
 
+        // Samples ride on the surfaces that moved.
+        let motion = rays.motion();
+        if let Some(motion) = motion.filter(|_| rides(motion)) {
+            ride(old, motion, &mut self.now);
+        }
+        let now = if rides(motion) { &self.now } else { old };
+
         let nearest = match by {
             Move::Camera => {
                 // Project the old pixels; the nearest hit wins.
-                let nearest = project(old, &to, landings, marks);
+                let nearest = project(now, &to, landings, marks);
                 // Clear what the line L behind an old hit could be hiding.
                 obscured(old, &from, &to, landings, marks);
                 nearest
@@ -164,7 +187,17 @@ impl Inference {
         if let Some(k) = nearest {
             entering(old_view, new_view, f64::from(k), marks);
         }
+
+        // Clear what something that moved stands before.
+        if let Some(motion) = motion {
+            moved(now, &to, motion, landings, marks);
+        }
     }
+}
+
+/// True if any sample may have moved with its surface.
+fn rides(motion: Option<&dyn Motion>) -> bool {
+    motion.is_some_and(|motion| !motion.bodies().is_empty())
 }
 
 impl Cost {
@@ -199,6 +232,11 @@ impl Marks {
         Some(Self::RANKS[rank as usize])
     }
 
-    const RANKS: [PixelClass; 4] =
-        [PixelClass::Overlapped, PixelClass::Bad, PixelClass::Entering, PixelClass::Creeping];
+    const RANKS: [PixelClass; 5] = [
+        PixelClass::Overlapped,
+        PixelClass::Bad,
+        PixelClass::Moved,
+        PixelClass::Entering,
+        PixelClass::Creeping,
+    ];
 }

@@ -51,6 +51,9 @@ pub fn project(old: &BuzzBuffer, new_view: &Projector, landings: &Landings, mark
     let project_row = |y: usize| {
         let mut nearest = f32::INFINITY;
         for i in y * width..(y + 1) * width {
+            if old.object[i] == UNKNOWN {
+                continue;
+            }
             let background = old.surface[i].is_background();
             let Some(p) = new_view.project(old.position[i], old.normal[i].get(), background) else {
                 continue;

@@ -23,8 +23,8 @@ pub enum Reason {
     First,
     /// Its segment begins after a cut.
     Cut,
-    /// Inference from the segment before would have cost more than tracing: the camera moves too fast, or something
-    /// in the scene changed.
+    /// Inference from the segment before would have cost more than tracing: the camera moves too fast, or too much of
+    /// what it sees does.
     Cost,
     /// The segment before had its longest useful length: samples lose their place as they are carried on, or another
     /// worker's share begins.
@@ -154,8 +154,8 @@ pub fn plan(path: &[PathFrame], cuts: &[i64], options: PlanOptions) -> Plan {
 /// the scene says.
 ///
 /// # Errors
-/// What does not fit, in words: if the segments do not hold every frame of the path once and in order, or if something
-/// within one changes that nothing can be inferred across.
+/// What does not fit, in words: if the segments do not hold every frame of the path once and in order, or if one goes on
+/// after a cut.
 pub fn replay(
     path: &[PathFrame],
     named: &[i64],
@@ -180,10 +180,7 @@ pub fn replay(
         if !(first..=last).contains(&key) {
             return fail("does not hold it".into());
         }
-        for PathFrame { frame, scene_changed, .. } in &frames[1..] {
-            if *scene_changed {
-                return fail(format!("goes on at frame {frame}, where more than the camera has moved"));
-            }
+        for PathFrame { frame, .. } in &frames[1..] {
             if cuts.contains(frame) || named.contains(frame) {
                 return fail(format!("goes on at frame {frame}, after a cut"));
             }

@@ -12,8 +12,8 @@ pub struct PathFrame {
     pub view: View,
     /// What a coarse grid of rays sees, rows from the top; see [`PathFrame::PROBE`].
     pub probe: Vec<ProbePoint>,
-    /// True if anything but the camera differs from the frame before.
-    pub scene_changed: bool,
+    /// Share of what the probe sees that is not where it was in the frame before.
+    pub moved: f64,
 }
 
 impl PathFrame {
@@ -41,14 +41,12 @@ pub struct ProbePoint {
 /// What happens to the image from one frame to the next, seen both ways.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Step {
-    /// Share of the later frame that the earlier one did not see.
+    /// Share of the later frame that the earlier one did not see, or saw somewhere else.
     pub new_forward: f64,
-    /// Share of the earlier frame that the later one does not see.
+    /// Share of the earlier frame that the later one does not see, or sees somewhere else.
     pub new_backward: f64,
     /// Mean distance in pixels that what both see moves on the image.
     pub pixels: f64,
-    /// True if more than the camera changed: nothing can be inferred across.
-    pub scene_changed: bool,
 }
 
 impl Step {
@@ -57,9 +55,12 @@ impl Step {
 
     /// True where inference across this step would cost more than tracing, one way or the other.
     pub fn is_dear(&self) -> bool {
-        self.scene_changed || self.new_forward.min(self.new_backward) > Self::DEAR
+        self.new_forward.min(self.new_backward) > Self::DEAR
     }
 }
+
+/// Share of the pixels of something that moved which are traced, around its outline and where it covers what stood still.
+const MOVED_ANEW: f64 = 0.5;
 
 /// Measures each step of a path; one fewer than frames.
 pub fn steps(path: &[PathFrame]) -> Vec<Step> {
@@ -69,10 +70,9 @@ pub fn steps(path: &[PathFrame]) -> Vec<Step> {
             let (new_forward, forward_pixels) = unseen(later, earlier);
             let (new_backward, backward_pixels) = unseen(earlier, later);
             Step {
-                new_forward,
-                new_backward,
+                new_forward: new_forward + later.moved * MOVED_ANEW,
+                new_backward: new_backward + later.moved * MOVED_ANEW,
                 pixels: 0.5 * (forward_pixels + backward_pixels),
-                scene_changed: later.scene_changed,
             }
         })
         .collect()

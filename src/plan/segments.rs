@@ -45,22 +45,21 @@ impl Chain {
     /// The chains of every possible key frame of a shot with these steps, of segments up to `others` frames besides
     /// the key: at most half of them before it, so that together they keep to the length.
     pub fn of_shot(steps: &[Step], others: usize, centred: bool) -> Vec<Self> {
-        let predict = |steps: &mut dyn Iterator<Item = (f64, f64, bool)>, longest: usize| {
+        let predict = |steps: &mut dyn Iterator<Item = (f64, f64)>, longest: usize| {
             let mut order = 1.0;
-            let chain = steps.take(longest).map_while(|(new, pixels, changed)| {
+            let chain = steps.take(longest).map_while(|(new, pixels)| {
                 order *= (-STEP_DECAY * (1.0 - (-pixels / DECAY_MOTION).exp())).exp();
                 let decayed = DECAYED[0] + (DECAYED[1] - DECAYED[0]) * (pixels / MUCH_MOTION).min(1.0);
                 let traced = new + if centred { EDGES } else { decayed * (1.0 - order) };
                 let traced = traced.min(1.0);
-                (!changed && traced <= Step::DEAR).then_some(traced)
+                (traced <= Step::DEAR).then_some(traced)
             });
             chain.collect::<Vec<_>>()
         };
         (0..=steps.len())
             .map(|key| {
-                let mut after = steps[key..].iter().map(|s| (s.new_forward, s.pixels, s.scene_changed));
-                let mut before =
-                    steps[..key].iter().rev().map(|s| (s.new_backward, s.pixels, s.scene_changed));
+                let mut after = steps[key..].iter().map(|s| (s.new_forward, s.pixels));
+                let mut before = steps[..key].iter().rev().map(|s| (s.new_backward, s.pixels));
                 Self {
                     forward: predict(&mut after, others - others / 2),
                     backward: predict(&mut before, others / 2),
@@ -198,7 +197,7 @@ mod tests {
 
     /// A camera that moves alike in every step, seeing so much of each frame anew.
     fn steady(frames: usize, new: f64) -> Vec<Chain> {
-        let step = Step { new_forward: new, new_backward: new, pixels: 3.0, scene_changed: false };
+        let step = Step { new_forward: new, new_backward: new, pixels: 3.0 };
         Chain::of_shot(&vec![step; frames - 1], 64, false)
     }
 

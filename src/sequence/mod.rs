@@ -2,6 +2,8 @@
 //!
 //! [`camera_path`] gives the planner what it asks for, [`crate::plan::plan`] decides, [`render_sequence`] renders.
 
+mod caster;
+mod motion;
 mod path;
 mod resolve;
 mod stereo;
@@ -12,14 +14,15 @@ pub use path::camera_path;
 use crate::accel::Accel;
 use crate::error::{Error, Result};
 use crate::frame::{
-    Aov, AovSet, Frame, FrameId, FrameKind, FrameStats, PixelClass, RayCounts, StageSeconds, StereoEye,
-    SurfaceSample, Window,
+    Aov, AovSet, Frame, FrameId, FrameKind, FrameStats, PixelClass, StageSeconds, StereoEye, Window,
 };
-use crate::infer::{BuzzBuffer, CastCentres, CastRays, Inference, Move, Projector, Trust};
+use crate::infer::{BuzzBuffer, Inference, Move, Projector, Trust};
 use crate::plan::{Plan, Segment};
 use crate::scene::{Pose, Scene, Stereo, View};
-use crate::trace::{TraceOptions, Tracer};
-use glam::{DVec3, Vec3};
+use crate::trace::{TraceOptions, Tracer, lit_words};
+use caster::{Caster, mix};
+use glam::DVec3;
+use motion::SceneMotion;
 use resolve::{MatteNames, Neighbour, Resolver, count_hidden, empty_frame};
 use std::collections::BTreeSet;
 use std::time::Instant;
@@ -204,34 +207,38 @@ fn render_segment(
     sink: &mut dyn FrameSink,
     observer: &mut dyn Observer,
 ) -> Result<()> {
-    // Nothing but the camera moves within a segment, so the key frame's pose holds for all of it.
-    let pose = scene.pose(scene.timing.time_of(segment.key));
-    let origin = shot(scene, settings, segment.key).view.eye;
-    accel.place(scene, &pose, origin);
-    let accel = &*accel;
-    let tracer = Tracer::new(scene, accel, &pose, settings.trace_options());
-    buffers.fit(settings, tracer.lit_words());
+    let key_shot = shot(scene, settings, segment.key);
+    let origin = key_shot.view.eye;
+    buffers.fit(settings, lit_words(scene, settings.trace_options()));
     let names = settings.aovs.contains(Aov::Crypto).then(|| MatteNames::of(scene));
-    let mut emitter =
-        Emitter { scene, settings, accel, tracer: &tracer, origin, cuts, wanted, names, sink, observer };
+    let mut emitter = Emitter { scene, settings, segment, origin, cuts, wanted, names, sink, observer };
     let Buffers { key, old, new, right, inference } = buffers;
 
-    let key_shot = shot(scene, settings, segment.key);
-    let stats = emitter.trace(segment.key, &key_shot, key);
-    emitter.emit(segment.key, FrameKind::Traced, &key_shot, key, stats)?;
-    emitter.emit_right(segment.key, (key, &key_shot), right, inference)?;
+    accel.place(scene, &key_shot.pose, origin);
+    let tracer = Tracer::new(scene, accel, &key_shot.pose, settings.trace_options());
+    let stats = emitter.trace(&tracer, &key_shot, key);
+    emitter.emit((accel, &tracer), &key_shot, key, stats)?;
+    emitter.emit_right((accel, &tracer), (key, &key_shot), right, inference)?;
 
     // Outward, as far as a wanted frame lies.
     let before = wanted.first().copied().unwrap_or(segment.key)..segment.key;
     let after = segment.key + 1..=wanted.last().copied().unwrap_or(segment.key);
+    let mut placed = key_shot.pose;
     for frames in [before.rev().collect::<Vec<_>>(), after.collect()] {
         let mut from = shot(scene, settings, segment.key);
         for (i, &number) in frames.iter().enumerate() {
             let to = shot(scene, settings, number);
             let source = if i == 0 { &*key } else { &*old };
-            let stats = emitter.infer(number, Move::Camera, (source, &from), (new, &to), inference);
-            emitter.emit(number, segment.kind(number), &to, new, stats)?;
-            emitter.emit_right(number, (new, &to), right, inference)?;
+            if !scene.surfaces_alike(&placed, &to.pose) {
+                accel.place(scene, &to.pose, origin);
+                placed.clone_from(&to.pose);
+            }
+            let tracer = Tracer::new(scene, accel, &to.pose, settings.trace_options());
+            let motion = SceneMotion::between(scene, accel, &tracer, (&from.pose, &to.pose), &to.view);
+            let caster = emitter.caster(&tracer, &to, motion.as_ref());
+            let stats = emitter.infer(Move::Camera, (source, &from), (new, &to), &caster, inference);
+            emitter.emit((accel, &tracer), &to, new, stats)?;
+            emitter.emit_right((accel, &tracer), (new, &to), right, inference)?;
             std::mem::swap(old, new);
             from = to;
         }
@@ -241,6 +248,7 @@ fn render_segment(
 
 /// The camera at a frame, or an eye about it: the rendered window as a view of its own, and the whole image.
 struct Shot {
+    frame: i64,
     camera: usize,
     eye: Option<StereoEye>,
     view: View,
@@ -260,78 +268,14 @@ fn shot_of(eye: Option<StereoEye>, scene: &Scene, settings: &Settings, frame: i6
     let middle = scene.view(&pose, camera, settings.width, settings.height);
     let of_eye = |stereo, eye| middle.of_eye(stereo, eye);
     let full_view = settings.stereo.zip(eye).map_or(middle, |(stereo, eye)| of_eye(stereo, eye));
-    Shot { camera, eye, view: full_view.cropped(settings.window), full_view, pose }
-}
-
-/// The tracer as inference wants it.
-struct Caster<'a> {
-    tracer: &'a Tracer<'a>,
-    view: &'a View,
-    observer: &'a dyn Observer,
-    /// See [`Settings::jitter`]; differs from frame to frame.
-    jitter: Option<u64>,
-}
-
-impl CastRays for Caster<'_> {
-    fn turned(&self, old: &View) -> Vec<[Vec3; 3]> {
-        self.tracer.turned(old, self.view)
-    }
-
-    fn is_cancelled(&self) -> bool {
-        self.observer.stop_requested().is_some()
-    }
-
-    fn cast(&self, x: usize, y: usize, lit: &mut [u32], counts: &mut RayCounts) -> SurfaceSample {
-        let offset = self.jitter.map_or([0.5; 2], |seed| {
-            let bits = mix(seed ^ ((y as u64) << 32 | x as u64));
-            [bits as u32, (bits >> 32) as u32].map(|b| f64::from(b) / (f64::from(u32::MAX) + 1.0))
-        });
-        self.tracer.cast(self.view, x as f64 + offset[0], y as f64 + offset[1], lit, counts)
-    }
-}
-
-impl CastCentres for Caster<'_> {
-    fn hit(&self, x: usize, y: usize, counts: &mut RayCounts) -> SurfaceSample {
-        self.tracer.hit(self.view, x as f64 + 0.5, y as f64 + 0.5, counts)
-    }
-
-    fn recast(&self, sample: &SurfaceSample, ask: &[u32], lit: &mut [u32], counts: &mut RayCounts) {
-        self.tracer.recast(sample, ask, lit, counts);
-    }
-
-    fn differ(&self, a: &[u32], b: &[u32], differ: &mut [u32]) {
-        self.tracer.differ(a, b, differ);
-    }
-
-    fn nearest_of(
-        &self,
-        x: usize,
-        y: usize,
-        candidates: impl Iterator<Item = SurfaceSample>,
-    ) -> Option<SurfaceSample> {
-        self.tracer.nearest_of(self.view, x as f64 + 0.5, y as f64 + 0.5, candidates)
-    }
-
-    fn is_hidden(&self, sample: &SurfaceSample, counts: &mut RayCounts) -> bool {
-        counts.visibility += 1;
-        self.tracer.is_hidden(self.view, sample)
-    }
-}
-
-/// Scatters the bits of a number (SplitMix64's finaliser).
-fn mix(n: u64) -> u64 {
-    let n = n.wrapping_add(0x9e37_79b9_7f4a_7c15);
-    let n = (n ^ n >> 30).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-    let n = (n ^ n >> 27).wrapping_mul(0x94d0_49bb_1331_11eb);
-    n ^ n >> 31
+    Shot { frame, camera, eye, view: full_view.cropped(settings.window), full_view, pose }
 }
 
 /// Turns samples into frames and hands them over.
 struct Emitter<'a> {
     scene: &'a Scene,
     settings: &'a Settings,
-    accel: &'a Accel,
-    tracer: &'a Tracer<'a>,
+    segment: &'a Segment,
     origin: DVec3,
     cuts: &'a [i64],
     wanted: &'a BTreeSet<i64>,
@@ -341,17 +285,22 @@ struct Emitter<'a> {
 }
 
 impl Emitter<'_> {
-    fn caster<'a>(&'a self, view: &'a View, frame: i64) -> Caster<'a> {
-        let jitter = self.settings.jitter.map(|seed| mix(seed ^ frame as u64));
-        Caster { tracer: self.tracer, view, observer: &*self.observer, jitter }
+    fn caster<'a>(
+        &'a self,
+        tracer: &'a Tracer<'a>,
+        shot: &'a Shot,
+        motion: Option<&'a SceneMotion<'a>>,
+    ) -> Caster<'a> {
+        let jitter = self.settings.jitter.map(|seed| mix(seed ^ shot.frame as u64));
+        Caster { tracer, view: &shot.view, observer: &*self.observer, jitter, motion }
     }
 
     /// Casts a ray through every pixel.
-    fn trace(&self, number: i64, shot: &Shot, buffer: &mut BuzzBuffer) -> FrameStats {
+    fn trace(&self, tracer: &Tracer<'_>, shot: &Shot, buffer: &mut BuzzBuffer) -> FrameStats {
         let start = Instant::now();
         buffer.forget(PixelClass::Traced);
         let projector = Projector::new(&shot.view, self.origin);
-        let rays = buffer.cast_unknown(&projector, &self.caster(&shot.view, number));
+        let rays = buffer.cast_unknown(&projector, &self.caster(tracer, shot, None));
         let mut stats = FrameStats { rays, ..FrameStats::default() };
         stats.seconds.trace = start.elapsed().as_secs_f64();
         stats
@@ -360,21 +309,20 @@ impl Emitter<'_> {
     /// Infers one view from another, as exactly as the quality asks.
     fn infer(
         &self,
-        number: i64,
         by: Move,
         (old, from): (&BuzzBuffer, &Shot),
         (new, to): (&mut BuzzBuffer, &Shot),
+        caster: &Caster<'_>,
         inference: &mut Inference,
     ) -> FrameStats {
         let start = Instant::now();
-        let (caster, origin) = (self.caster(&to.view, number), self.origin);
-        let (source, target) = ((old, &from.view), (new, &to.view));
+        let (source, target, origin) = ((old, &from.view), (new, &to.view), self.origin);
         let cost = match self.settings.quality {
-            Quality::Full | Quality::HalfPixel => inference.infer(by, source, target, origin, &caster),
+            Quality::Full | Quality::HalfPixel => inference.infer(by, source, target, origin, caster),
             Quality::Centred => {
-                inference.infer_centred(by, source, target, origin, Trust::Neighbours, &caster)
+                inference.infer_centred(by, source, target, origin, Trust::Neighbours, caster)
             }
-            Quality::Verified => inference.infer_centred(by, source, target, origin, Trust::Proof, &caster),
+            Quality::Verified => inference.infer_centred(by, source, target, origin, Trust::Proof, caster),
         };
         let mut stats = FrameStats { rays: cost.rays, ..FrameStats::default() };
         stats.seconds.trace = cost.tracing.as_secs_f64();
@@ -382,16 +330,26 @@ impl Emitter<'_> {
         stats
     }
 
+    /// How a frame, or an eye of it, is made.
+    fn kind(&self, shot: &Shot) -> FrameKind {
+        match shot.eye {
+            Some(StereoEye::Right) if self.settings.quality != Quality::Full => {
+                FrameKind::Inferred { from: shot.frame }
+            }
+            _ => self.segment.kind(shot.frame),
+        }
+    }
+
     /// Finishes a frame, unless the user asked to stop: then its samples may be missing, and it is dropped.
     fn emit(
         &mut self,
-        number: i64,
-        kind: FrameKind,
+        (accel, tracer): (&Accel, &Tracer<'_>),
         shot: &Shot,
         buffer: &BuzzBuffer,
         mut stats: FrameStats,
     ) -> Result<()> {
         go_on(self.observer)?;
+        let (number, kind) = (shot.frame, self.kind(shot));
         if self.wanted.contains(&number) {
             let start = Instant::now();
             stats.pixels = buffer.count_classes();
@@ -404,18 +362,18 @@ impl Emitter<'_> {
             let resolver = Resolver {
                 scene: self.scene,
                 settings: self.settings,
-                tracer: self.tracer,
+                tracer,
                 observer: &*self.observer,
                 origin: self.origin,
                 shot,
-                next: self.neighbour(shot, number + 1, self.cuts.contains(&(number + 1))),
-                previous: self.neighbour(shot, number - 1, self.cuts.contains(&number)),
+                next: self.neighbour(accel, shot, number + 1, self.cuts.contains(&(number + 1))),
+                previous: self.neighbour(accel, shot, number - 1, self.cuts.contains(&number)),
                 names: self.names.as_ref(),
             };
             stats.rays += resolver.resolve(buffer, &mut frame);
             stats.seconds.enhance = start.elapsed().as_secs_f64();
             if self.settings.audit {
-                stats.hidden = Some(count_hidden(self.tracer, &*self.observer, &shot.view, buffer));
+                stats.hidden = Some(count_hidden(tracer, &*self.observer, &shot.view, buffer));
             }
             go_on(self.observer)?;
             frame.stats = stats;
@@ -427,14 +385,14 @@ impl Emitter<'_> {
     }
 
     /// The frame next to `shot`, for motion; none across a cut or outside the range.
-    fn neighbour(&self, shot: &Shot, number: i64, is_cut: bool) -> Option<Neighbour> {
+    fn neighbour(&self, accel: &Accel, shot: &Shot, number: i64, is_cut: bool) -> Option<Neighbour> {
         let timing = &self.scene.timing;
         let wanted = self.settings.aovs.contains(Aov::Motion) && !is_cut;
         let inside = (timing.first..=timing.last).contains(&number);
         let other = (wanted && inside).then(|| shot_of(shot.eye, self.scene, self.settings, number));
         other.filter(|o| o.camera == shot.camera).map(|o| {
-            let moved = !self.scene.looks_alike(&shot.pose, &o.pose);
-            Neighbour { view: o.view, surfaces: moved.then(|| self.accel.displaced(self.scene, &o.pose)) }
+            let moved = !self.scene.surfaces_alike(&shot.pose, &o.pose);
+            Neighbour { view: o.view, surfaces: moved.then(|| accel.displaced(self.scene, &o.pose)) }
         })
     }
 }

@@ -2,30 +2,32 @@
 
 use super::{Emitter, Shot, shot_of};
 use crate::Result;
-use crate::frame::{FrameKind, Quality, StereoEye};
+use crate::accel::Accel;
+use crate::frame::{Quality, StereoEye};
 use crate::infer::{BuzzBuffer, Inference, Move};
+use crate::trace::Tracer;
 
 impl Emitter<'_> {
     /// In stereo, makes and finishes the right eye of a frame that is wanted. Nothing else hangs on it: the next frame's
     /// comes from its own left eye, so an error is not carried on.
     pub(super) fn emit_right(
         &mut self,
-        number: i64,
+        (accel, tracer): (&Accel, &Tracer<'_>),
         (left, left_shot): (&BuzzBuffer, &Shot),
         right: &mut BuzzBuffer,
         inference: &mut Inference,
     ) -> Result<()> {
-        if self.settings.stereo.is_none() || !self.wanted.contains(&number) {
+        if self.settings.stereo.is_none() || !self.wanted.contains(&left_shot.frame) {
             return Ok(());
         }
-        let shot = shot_of(Some(StereoEye::Right), self.scene, self.settings, number);
-        let (kind, stats) = if self.settings.quality == Quality::Full {
-            (FrameKind::Traced, self.trace(number, &shot, right))
+        let shot = shot_of(Some(StereoEye::Right), self.scene, self.settings, left_shot.frame);
+        let stats = if self.settings.quality == Quality::Full {
+            self.trace(tracer, &shot, right)
         } else {
-            let (old, new) = ((left, left_shot), (&mut *right, &shot));
-            let stats = self.infer(number, Move::OtherEye, old, new, inference);
-            (FrameKind::Inferred { from: number }, stats)
+            // Between the eyes of a frame nothing moves.
+            let caster = self.caster(tracer, &shot, None);
+            self.infer(Move::OtherEye, (left, left_shot), (&mut *right, &shot), &caster, inference)
         };
-        self.emit(number, kind, &shot, right, stats)
+        self.emit((accel, tracer), &shot, right, stats)
     }
 }

@@ -2,6 +2,7 @@
 
 use super::form_factor::{MOST_CORNERS, disc_share, polygon};
 use super::sequence::{MIDDLE, cone, disc};
+use crate::frame::Way;
 use crate::scene::{LightKind, Outline, PosedLight};
 use glam::{DVec3, Vec2, Vec3};
 use std::f32::consts::{PI, TAU};
@@ -123,6 +124,18 @@ impl Emitter {
             Shape::Sphere { radius, .. } => radius > 0.0,
             Shape::Directional { sin, .. } => sin > 0.0,
             Shape::Panel(_) => true,
+        }
+    }
+
+    /// The way on which its light comes to any point: from all of it, or from its middle.
+    pub fn way(&self, all: bool) -> Way {
+        let size = |size: f32| if all { size } else { 0.0 };
+        match &self.shape {
+            Shape::Sphere { position, radius, .. } => Way::From(*position, size(*radius)),
+            Shape::Directional { to_light, sin } => {
+                Way::Along(*to_light, size(sin / (1.0 - sin * sin).max(f32::MIN_POSITIVE).sqrt()))
+            }
+            Shape::Panel(panel) => Way::From(panel.middle, size((panel.right + panel.up).length())),
         }
     }
 

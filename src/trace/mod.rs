@@ -7,6 +7,7 @@
 //! sample and its shadow bits alone, whether the sample was just cast or carried over from another frame: so a still
 //! camera gives the same values frame after frame.
 
+mod changes;
 mod form_factor;
 mod ggx;
 mod interaction;
@@ -20,8 +21,9 @@ mod whitted;
 mod world;
 
 use crate::accel::{Accel, Ray, Sides};
-use crate::frame::{PackedNormal, RayCounts, SurfaceSample};
+use crate::frame::{PackedNormal, RayCounts, SurfaceRef, SurfaceSample};
 use crate::scene::{Pose, Scene, View};
+pub use changes::LightChanges;
 use glam::Vec3;
 use interaction::{Beam, SurfaceInteraction};
 use light::Emitter;
@@ -106,7 +108,7 @@ impl Eye {
 
 impl<'a> Tracer<'a> {
     /// A tracer of `scene` as `accel` has it placed, under the lights of `pose`.
-    pub fn new(scene: &'a Scene, accel: &'a Accel, pose: &'a Pose, options: TraceOptions) -> Self {
+    pub fn new(scene: &'a Scene, accel: &'a Accel, pose: &Pose, options: TraceOptions) -> Self {
         let lights = pose.lights.iter().map(|l| Emitter::new(l, accel.origin())).collect();
         let layout = Layout::new(scene, options);
         Self { scene, accel, options, lights, layout, world: Surroundings::new(scene) }
@@ -198,13 +200,21 @@ impl<'a> Tracer<'a> {
             return (SurfaceSample::background(ray.direction.normalize_or(Vec3::NEG_Z)), None);
         };
         let point = SurfacePoint::new(self.scene, self.accel, hit.surface, Side::Front(hit.front));
-        let sample = SurfaceSample {
+        (self.sample(hit.surface, &point), Some(point))
+    }
+
+    /// The sample of a point on a surface, which must not be the background, seen from its front or its back.
+    pub fn sample_at(&self, surface: SurfaceRef, front: bool) -> SurfaceSample {
+        self.sample(surface, &SurfacePoint::new(self.scene, self.accel, surface, Side::Front(front)))
+    }
+
+    fn sample(&self, surface: SurfaceRef, point: &SurfacePoint) -> SurfaceSample {
+        SurfaceSample {
             position: point.position,
-            surface: hit.surface,
-            object: self.scene.instances[hit.surface.instance as usize].object,
+            surface,
+            object: self.scene.instances[surface.instance as usize].object,
             normal: PackedNormal::new(point.geometric),
-        };
-        (sample, Some(point))
+        }
     }
 
     /// Casts rays to each light that is `asked` for and could shine on the point, and to the world.

@@ -94,6 +94,16 @@ impl Field {
         words[self.word] |= bits.min(self.whole) << self.shift;
     }
 
+    /// The number of its word, and its bits there.
+    pub fn bits_at(self) -> (usize, u32) {
+        (self.word, self.whole << self.shift)
+    }
+
+    /// True if it holds a share, not only whether the light arrives.
+    pub fn is_share(self) -> bool {
+        self.whole > 1
+    }
+
     /// Whether any of its bits is set in `words`.
     pub fn is_set(self, words: &[u32]) -> bool {
         self.bits(words) != 0

@@ -1,6 +1,7 @@
 //! The same bytes, however the work is cut up. (However often it is killed: `tests/faults.rs`.)
 
 use crate::rig::{SMALL, assert_same_bytes, courtyard, fresh, reference, run};
+use std::path::Path;
 
 #[test]
 fn one_thread_and_three_chunks_give_the_bytes_of_two_threads_and_one_run() {
@@ -30,5 +31,17 @@ fn chunks_that_begin_and_end_within_segments_give_the_same_bytes() {
         let (_folder, out) = fresh();
         run(&courtyard(), &out, &format!("{SMALL} -f {frames}")).ok();
         assert_eq!(assert_same_bytes(&out, reference()), count, "{frames}");
+    }
+}
+
+#[test]
+fn what_moves_moves_alike_in_chunks_and_on_one_thread() {
+    let stage = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/stage/stage.gltf");
+    let (_folder, whole) = fresh();
+    run(&stage, &whole, &format!("{SMALL} -f 20-40")).ok();
+    for (frames, count) in [("20-29", 10), ("30-40", 11), ("35", 1)] {
+        let (_folder, out) = fresh();
+        run(&stage, &out, &format!("{SMALL} -j 1 -f {frames}")).ok();
+        assert_eq!(assert_same_bytes(&out, &whole), count, "{frames}");
     }
 }

@@ -2,6 +2,7 @@
 
 use crate::rig::{buzz, channels, frames_in, fresh, json, run};
 use crate::stage::{CAMERA, CARD, LAMP, Stage};
+use serde_json::Value;
 use std::path::Path;
 
 #[test]
@@ -23,51 +24,99 @@ fn a_camera_that_stands_still_gives_the_key_frames_values() {
     }
 }
 
-/// Renders `stage` at both qualities; frames of which `changes` says that something but the camera moved since the
-/// frame before must begin a segment.
-fn assert_changes_are_traced(stage: &Stage, changes: &[i64]) {
+/// Renders `stage`, whose camera stands still, inferred and in full, and holds every inferred value to the full one.
+/// Returns the reports.
+#[track_caller]
+fn assert_inferred_as_traced(stage: &Stage) -> (Value, Value) {
     let (folder, out) = fresh();
     let scene = stage.write(&folder.path().join("s.gltf"));
     let full = folder.path().join("full");
-    run(&scene, &out, "-r 64x36 --aov all").ok();
+    run(&scene, &out, "-r 64x36 --aov all --segment 99").ok();
     run(&scene, &full, "-r 64x36 --aov all -q full").ok();
-    let report = json(&out.join("report.json"));
-    let segments = report["plan"]["segments"].as_array().unwrap();
-    for &change in changes {
-        let segment = segments.iter().position(|s| s["first"] == change);
-        let segment = segment.unwrap_or_else(|| panic!("no segment begins at {change}: {segments:?}"));
-        assert_eq!(report["plan"]["keyframes"][segment]["reason"], "cost");
-        // Where the next frame has changed again, there is nobody to infer this one from.
-        if changes.contains(&(change + 1)) {
-            assert_eq!(report["frames"][change as usize]["kind"], "traced");
+    for name in frames_in(&out) {
+        let (inferred, traced) = (channels(&out.join(&name)), channels(&full.join(&name)));
+        for (channel, values) in inferred.into_iter().filter(|(channel, _)| channel != "pixelClass.id") {
+            let pairs = values.iter().zip(&traced[&channel]);
+            let furthest = pairs.map(|(a, b)| (a - b).abs() / (1.0 + b.abs())).fold(0.0, f32::max);
+            assert!(furthest < 2e-3, "{channel} of {name}: {furthest}");
         }
     }
-    let keys: Vec<i64> = segments.iter().map(|s| s["key"].as_i64().unwrap()).collect();
-    for key in &keys {
-        let name = format!("s.{key:04}.exr");
-        assert!(channels(&out.join(&name)) == channels(&full.join(&name)), "frame {key}");
-    }
-    assert!(keys.len() < report["frames"].as_array().unwrap().len(), "nothing was inferred");
-    assert_close(&out, &full);
+    let reports = (json(&out.join("report.json")), json(&full.join("report.json")));
+    assert_eq!(reports.0["totals"]["traced_frames"], 1);
+    reports
 }
 
-fn assert_close(folder: &Path, reference: &Path) {
-    let arguments = ["compare", folder.to_str().unwrap(), reference.to_str().unwrap(), "--fail-below", "25"];
-    buzz(arguments).ok();
+/// A ray count of all inferred frames.
+fn inferred_rays(report: &Value, kind: &str) -> u64 {
+    let frames = report["frames"].as_array().unwrap().iter();
+    frames.filter(|f| f["kind"] != "traced").map(|f| f["rays"][kind].as_u64().unwrap()).sum()
 }
 
 #[test]
-fn frames_in_which_an_object_moves_are_traced() {
-    let mut stage = Stage::drifting(12);
-    let place = |i: i32| [0.2 * (i.clamp(4, 8) - 4) as f32, 0.0, 0.0];
+fn an_object_that_slides_is_where_a_full_trace_has_it_and_so_is_its_shadow() {
+    let mut stage = Stage::new();
+    let place = |i: i32| [0.04 * (i.clamp(3, 9) - 3) as f32, 0.0, 0.0];
     stage.translate(CARD, &(0..12).map(place).collect::<Vec<_>>());
-    assert_changes_are_traced(&stage, &[5, 6, 7, 8]);
+    let (inferred, full) = assert_inferred_as_traced(&stage);
+    let saved = |kind| 1.0 - inferred_rays(&inferred, kind) as f64 / inferred_rays_of_full(&full, kind);
+    assert!(saved("primary") > 0.6, "{}", saved("primary"));
+    assert!(saved("shadow") > 0.6, "{}", saved("shadow"));
+    let moved = inferred["frames"].as_array().unwrap().iter().map(|f| f["pixels"]["moved"].as_u64().unwrap());
+    assert!(moved.sum::<u64>() > 0, "nothing came in front of the floor");
+}
+
+/// A ray count of the frames that the test infers: all but one of twelve.
+fn inferred_rays_of_full(full: &Value, kind: &str) -> f64 {
+    let frames = full["frames"].as_array().unwrap().iter();
+    frames.map(|f| f["rays"][kind].as_u64().unwrap()).sum::<u64>() as f64 * 11.0 / 12.0
 }
 
 #[test]
-fn frames_in_which_a_light_moves_are_traced() {
-    let mut stage = Stage::drifting(12);
-    let place = |i: i32| [2.0 - 0.5 * (i.clamp(4, 7) - 4) as f32, 4.0, 3.0];
+fn an_object_that_is_switched_on_and_off_leaves_nothing_behind() {
+    let mut stage = Stage::new();
+    stage.show(CARD, &[true, true, false, false, true, true]);
+    assert_inferred_as_traced(&stage);
+}
+
+#[test]
+fn a_light_that_moves_takes_shadow_rays_only() {
+    let mut stage = Stage::new();
+    let place = |i: i32| [2.0 - 0.1 * (i.clamp(4, 7) - 4) as f32, 4.0, 3.0];
     stage.translate(LAMP, &(0..12).map(place).collect::<Vec<_>>());
-    assert_changes_are_traced(&stage, &[5, 6, 7]);
+    let (inferred, full) = assert_inferred_as_traced(&stage);
+    assert_eq!(inferred_rays(&inferred, "primary"), 0);
+    // It is asked in the three frames in which it has moved.
+    let each = full["frames"][5]["rays"]["shadow"].as_u64().unwrap();
+    assert!(inferred_rays(&inferred, "shadow") <= each * 3 + each / 10);
+}
+
+#[test]
+fn a_light_that_changes_takes_no_ray_but_where_it_had_not_shone() {
+    let mut stage = Stage::new();
+    stage.change("/extensions/KHR_lights_punctual/lights/0/intensity", &[6e4, 5e4, 3e4, 1e4, 2e4, 7e4]);
+    let (inferred, _) = assert_inferred_as_traced(&stage);
+    assert_eq!(inferred_rays(&inferred, "primary") + inferred_rays(&inferred, "shadow"), 0);
+
+    let mut stage = Stage::new();
+    stage.change("/extensions/KHR_lights_punctual/lights/0/intensity", &[0.0, 0.0, 0.0, 1e4, 2e4, 7e4]);
+    let (inferred, full) = assert_inferred_as_traced(&stage);
+    let each = full["frames"][5]["rays"]["shadow"].as_u64().unwrap();
+    let key_is_dark = inferred["plan"]["keyframes"][0]["frame"].as_i64().unwrap() < 3;
+    assert_eq!(inferred_rays(&inferred, "shadow"), if key_is_dark { each } else { 0 });
+}
+
+#[test]
+fn our_stage_is_inferred_whatever_moves() {
+    let scene = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/stage/stage.gltf");
+    let (folder, out) = fresh();
+    let full = folder.path().join("full");
+    let frames = "-r 240x135 -f 8-19 --segment 24";
+    run(&scene, &out, frames).ok();
+    run(&scene, &full, &format!("{frames} -q full")).ok();
+    let report = json(&out.join("report.8-19.json"));
+    let classes =
+        report["frames"].as_array().unwrap().iter().map(|f| f["pixels"]["traced"].as_u64().unwrap());
+    assert!(classes.filter(|&traced| traced > 0).count() <= 1, "one key frame at most");
+    let arguments = ["compare", out.to_str().unwrap(), full.to_str().unwrap(), "--fail-below", "40"];
+    buzz(arguments).ok();
 }

@@ -57,15 +57,39 @@ impl Stage {
 
     /// Puts `node` at one place after the other, a frame each.
     pub fn translate(&mut self, node: usize, path: &[[f32; 3]]) {
-        let times: Vec<f32> = (0..path.len()).map(|i| i as f32 / 24.0).collect();
-        let (input, output) = (self.floats("SCALAR", &times), self.floats("VEC3", &path.concat()));
-        self.push(
-            "animations",
-            json!({
-                "samplers": [{"input": input, "output": output}],
-                "channels": [{"sampler": 0, "target": {"node": node, "path": "translation"}}],
-            }),
-        );
+        let output = self.floats("VEC3", &path.concat());
+        self.animate(path.len(), output, "LINEAR", json!({"node": node, "path": "translation"}));
+    }
+
+    /// Gives what a JSON pointer names one value after the other, a frame each.
+    pub fn change(&mut self, pointer: &str, values: &[f32]) {
+        let output = self.floats("SCALAR", values);
+        self.point_at(pointer, values.len(), output, "LINEAR");
+    }
+
+    /// Shows or hides `node`, a frame each.
+    pub fn show(&mut self, node: usize, visible: &[bool]) {
+        self.json["nodes"][node]["extensions"] = json!({"KHR_node_visibility": {"visible": true}});
+        self.json["extensionsUsed"].as_array_mut().unwrap().push("KHR_node_visibility".into());
+        let bytes: Vec<u8> = visible.iter().map(|&v| u8::from(v)).collect();
+        let output = self.accessor("SCALAR", 5121, visible.len(), &bytes);
+        let pointer = format!("/nodes/{node}/extensions/KHR_node_visibility/visible");
+        self.point_at(&pointer, visible.len(), output, "STEP");
+    }
+
+    fn point_at(&mut self, pointer: &str, keys: usize, output: usize, interpolation: &str) {
+        self.json["extensionsUsed"].as_array_mut().unwrap().push("KHR_animation_pointer".into());
+        let target =
+            json!({"path": "pointer", "extensions": {"KHR_animation_pointer": {"pointer": pointer}}});
+        self.animate(keys, output, interpolation, target);
+    }
+
+    fn animate(&mut self, keys: usize, output: usize, interpolation: &str, target: Value) {
+        let times: Vec<f32> = (0..keys).map(|i| i as f32 / 24.0).collect();
+        let input = self.floats("SCALAR", &times);
+        let sampler = json!({"input": input, "output": output, "interpolation": interpolation});
+        let channels = json!([{"sampler": 0, "target": target}]);
+        self.push("animations", json!({"samplers": [sampler], "channels": channels}));
     }
 
     pub fn write(&self, path: &Path) -> PathBuf {
@@ -89,15 +113,24 @@ impl Stage {
     fn floats(&mut self, kind: &str, values: &[f32]) -> usize {
         let width = if kind == "VEC3" { 3 } else { 1 };
         let bytes: Vec<u8> = values.iter().flat_map(|v| v.to_le_bytes()).collect();
-        let view = json!({"buffer": 0, "byteOffset": self.bytes.len(), "byteLength": bytes.len()});
-        self.bytes.extend(bytes);
-        let view = self.push("bufferViews", view);
-        let count = values.len() / width;
+        let accessor = self.accessor(kind, 5126, values.len() / width, &bytes);
         // A POSITION accessor must have bounds; any will do for a time.
         let bound = |pick: fn(f32, f32) -> f32| -> Vec<f32> {
             (0..width).map(|c| values.iter().skip(c).step_by(width).copied().reduce(pick).unwrap()).collect()
         };
-        let accessor = json!({"bufferView": view, "type": kind, "componentType": 5126, "count": count, "min": bound(f32::min), "max": bound(f32::max)});
-        self.push("accessors", accessor)
+        self.json["accessors"][accessor]["min"] = json!(bound(f32::min));
+        self.json["accessors"][accessor]["max"] = json!(bound(f32::max));
+        accessor
+    }
+
+    fn accessor(&mut self, kind: &str, component: u32, count: usize, bytes: &[u8]) -> usize {
+        let view = json!({"buffer": 0, "byteOffset": self.bytes.len(), "byteLength": bytes.len()});
+        self.bytes.extend(bytes);
+        self.bytes.resize(self.bytes.len().next_multiple_of(4), 0);
+        let view = self.push("bufferViews", view);
+        self.push(
+            "accessors",
+            json!({"bufferView": view, "type": kind, "componentType": component, "count": count}),
+        )
     }
 }

@@ -5,5 +5,6 @@
 mod centred;
 mod five_pixels;
 mod half_pixel;
+mod moved;
 mod rig;
 mod stereo;

@@ -1,0 +1,78 @@
+//! The tracer as inference wants it.
+
+use super::Observer;
+use super::motion::SceneMotion;
+use crate::frame::{RayCounts, SurfaceSample};
+use crate::infer::{CastCentres, CastRays, Motion};
+use crate::scene::View;
+use crate::trace::Tracer;
+use glam::Vec3;
+
+/// Casts the rays of one frame.
+pub(super) struct Caster<'a> {
+    pub tracer: &'a Tracer<'a>,
+    pub view: &'a View,
+    pub observer: &'a dyn Observer,
+    /// See [`super::Settings::jitter`]; differs from frame to frame.
+    pub jitter: Option<u64>,
+    /// What differs from the frame that is inferred from, if anything but the camera.
+    pub motion: Option<&'a SceneMotion<'a>>,
+}
+
+impl CastRays for Caster<'_> {
+    fn turned(&self, old: &View) -> Vec<[Vec3; 3]> {
+        self.tracer.turned(old, self.view)
+    }
+
+    fn is_cancelled(&self) -> bool {
+        self.observer.stop_requested().is_some()
+    }
+
+    fn cast(&self, x: usize, y: usize, lit: &mut [u32], counts: &mut RayCounts) -> SurfaceSample {
+        let offset = self.jitter.map_or([0.5; 2], |seed| {
+            let bits = mix(seed ^ ((y as u64) << 32 | x as u64));
+            [bits as u32, (bits >> 32) as u32].map(|b| f64::from(b) / (f64::from(u32::MAX) + 1.0))
+        });
+        self.tracer.cast(self.view, x as f64 + offset[0], y as f64 + offset[1], lit, counts)
+    }
+
+    fn motion(&self) -> Option<&dyn Motion> {
+        self.motion.map(|motion| motion as &dyn Motion)
+    }
+}
+
+impl CastCentres for Caster<'_> {
+    fn hit(&self, x: usize, y: usize, counts: &mut RayCounts) -> SurfaceSample {
+        self.tracer.hit(self.view, x as f64 + 0.5, y as f64 + 0.5, counts)
+    }
+
+    fn recast(&self, sample: &SurfaceSample, ask: &[u32], lit: &mut [u32], counts: &mut RayCounts) {
+        self.tracer.recast(sample, ask, lit, counts);
+    }
+
+    fn differ(&self, a: &[u32], b: &[u32], differ: &mut [u32]) {
+        self.tracer.differ(a, b, differ);
+    }
+
+    fn nearest_of(
+        &self,
+        x: usize,
+        y: usize,
+        candidates: impl Iterator<Item = SurfaceSample>,
+    ) -> Option<SurfaceSample> {
+        self.tracer.nearest_of(self.view, x as f64 + 0.5, y as f64 + 0.5, candidates)
+    }
+
+    fn is_hidden(&self, sample: &SurfaceSample, counts: &mut RayCounts) -> bool {
+        counts.visibility += 1;
+        self.tracer.is_hidden(self.view, sample)
+    }
+}
+
+/// Scatters the bits of a number (SplitMix64's finaliser).
+pub(super) fn mix(n: u64) -> u64 {
+    let n = n.wrapping_add(0x9e37_79b9_7f4a_7c15);
+    let n = (n ^ n >> 30).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+    let n = (n ^ n >> 27).wrapping_mul(0x94d0_49bb_1331_11eb);
+    n ^ n >> 31
+}
