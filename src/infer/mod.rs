@@ -26,7 +26,7 @@ mod obscured;
 mod project;
 mod shadow_edges;
 
-pub use around::Trust;
+pub use around::{Trust, is_one_surface};
 pub use buzz_buffer::{BuzzBuffer, CastRays, Projected, Projector, UNKNOWN};
 pub use centre::{CastCentres, Centring};
 pub use creeping::{Along, creeping};
