@@ -210,7 +210,7 @@ fn is_same_primitive(old: &BuzzBuffer, a: usize, b: usize) -> bool {
 }
 
 /// True where two samples lie on one surface, with no step between them.
-pub(super) fn is_one_surface(a: &SurfaceSample, b: &SurfaceSample, view: &Projector) -> bool {
+pub fn is_one_surface(a: &SurfaceSample, b: &SurfaceSample, view: &Projector) -> bool {
     if a.object != b.object {
         return false;
     }

@@ -32,7 +32,7 @@ mod stereo;
 mod turned;
 mod voxels;
 
-pub use around::Trust;
+pub use around::{Trust, is_one_surface};
 pub use buzz_buffer::{BuzzBuffer, CastRays, Projected, Projector, UNKNOWN};
 pub use centre::{CastCentres, Centring};
 pub use creeping::{Along, creeping};

@@ -6,8 +6,10 @@
 
 mod motion;
 mod segments;
+mod weights;
 
-pub use motion::{PathFrame, ProbePoint, Step};
+pub use motion::{Change, PathFrame, ProbePoint, Step, steps};
+pub use weights::{SHADOW_RAY, Weights};
 
 use crate::frame::{FrameKind, Quality};
 use motion::find_cuts;
@@ -196,7 +198,7 @@ pub fn replay(
 /// What is known about a path before it is divided.
 struct Survey<'a> {
     path: &'a [PathFrame],
-    steps: Vec<Step>,
+    longest_segment: u32,
     /// Named and found.
     cuts: Vec<i64>,
     /// Of each frame as a key frame; none reaches across a cut.
@@ -207,14 +209,17 @@ impl<'a> Survey<'a> {
     fn of(path: &'a [PathFrame], cuts: &[i64], quality: Quality, longest_segment: u32) -> Self {
         let steps = motion::steps(path);
         let cuts = find_cuts(path, &steps, cuts);
+        let shadow_rays: Vec<f64> = path.iter().map(|f| f.shadow_rays).collect();
+        let total: f64 = shadow_rays.iter().map(|&rays| Weights::traced_cost(rays)).sum();
+        let (weights, unit) = (Weights::of(quality), total / path.len().max(1) as f64);
         let mut chains = Vec::with_capacity(path.len());
         while chains.len() < path.len() {
             let first = chains.len();
             let end = (first + 1..path.len()).find(|&i| cuts.contains(&path[i].frame)).unwrap_or(path.len());
-            let (shot, others) = (&steps[first..end - 1], longest_segment.saturating_sub(1) as usize);
-            chains.extend(Chain::of_shot(shot, others, quality.is_centred()));
+            let (shot, rays) = (&steps[first..end - 1], &shadow_rays[first..end]);
+            chains.extend(Chain::of_shot(shot, rays, longest_segment.max(1) as usize - 1, &weights, unit));
         }
-        Self { path, steps, cuts, chains }
+        Self { path, longest_segment, cuts, chains }
     }
 
     /// The place of a frame in the path, whose frames follow on one another; beyond it for frames that it has not.
@@ -229,7 +234,7 @@ impl<'a> Survey<'a> {
             _ if self.path.len() == 1 => Reason::Only,
             0 => Reason::First,
             _ if self.cuts.contains(&self.path[first].frame) => Reason::Cut,
-            _ if full || self.steps[first - 1].is_dear() => Reason::Cost,
+            _ if full || (self.longest_segment > 1 && !self.chains[first - 1].goes_on()) => Reason::Cost,
             _ => Reason::Length,
         }
     }

@@ -1,7 +1,7 @@
 //! What a camera move does to the image, measured on a coarse probe of the scene.
 
 use crate::scene::View;
-use glam::DVec3;
+use glam::{DVec2, DVec3};
 
 /// One frame of the path that is planned.
 #[derive(Debug, Clone)]
@@ -14,13 +14,15 @@ pub struct PathFrame {
     pub probe: Vec<ProbePoint>,
     /// Share of what the probe sees that is not where it was in the frame before.
     pub moved: f64,
+    /// Rays to lights and to the world that a pixel takes when it is traced, mean over the probe.
+    pub shadow_rays: f64,
 }
 
 impl PathFrame {
-    /// Columns and rows of the probe's grid: half a thousand rays see a step's share of new pixels within some 2 %.
+    /// Columns and rows of the probe's grid: half a thousand pixels tell a share of the image within some 2 %.
     pub const PROBE: (u32, u32) = (32, 18);
 
-    /// Raster positions of the probe's rays.
+    /// Raster positions of the probe's pixels.
     pub fn probe_positions(view: &View) -> impl Iterator<Item = (f64, f64)> + use<> {
         let (columns, rows) = Self::PROBE;
         let (w, h) = (f64::from(view.width) / f64::from(columns), f64::from(view.height) / f64::from(rows));
@@ -29,83 +31,123 @@ impl PathFrame {
     }
 }
 
-/// What one ray of the probe sees.
+/// What one pixel of the probe sees.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ProbePoint {
     /// World position, or a unit direction for the background.
     pub position: DVec3,
     /// Planar depth; infinite for the background.
     pub z: f64,
+    /// World positions of what is seen a pixel to the right and a pixel below, as for `position`.
+    pub beside: [DVec3; 2],
+    /// True if another surface is seen within a pixel of it.
+    pub is_edge: bool,
+    /// True if something hides it from the eye of the frame before; of the frame after.
+    pub hidden: [bool; 2],
 }
 
 /// What happens to the image from one frame to the next, seen both ways.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Step {
-    /// Share of the later frame that the earlier one did not see, or saw somewhere else.
-    pub new_forward: f64,
-    /// Share of the earlier frame that the later one does not see, or sees somewhere else.
-    pub new_backward: f64,
+    /// What the later frame shows, if it is inferred from the earlier one.
+    pub forward: Change,
+    /// What the earlier frame shows, if it is inferred from the later one.
+    pub backward: Change,
+}
+
+/// What a frame shows, compared with the neighbour that it may be inferred from. Shares are those of its pixels.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Change {
+    /// Share outside the neighbour's image.
+    pub outside: f64,
+    /// Share within it that something hid from the neighbour's eye.
+    pub hidden: f64,
+    /// Share that the neighbour saw, but before which something new may have come in from the side.
+    pub contested: f64,
+    /// Share on which no sample lands because what both see has grown on the image.
+    pub stretched: f64,
+    /// Share that the neighbour saw, that moves, and that lies at an edge of a surface.
+    pub edges: f64,
+    /// Share that is not where it was in the other frame.
+    pub moved: f64,
     /// Mean distance in pixels that what both see moves on the image.
     pub pixels: f64,
 }
 
-impl Step {
-    /// Share of a frame above which inferring it is dearer than tracing it.
-    pub const DEAR: f64 = 0.75;
-
-    /// True where inference across this step would cost more than tracing, one way or the other.
-    pub fn is_dear(&self) -> bool {
-        self.new_forward.min(self.new_backward) > Self::DEAR
+impl Change {
+    /// Share that the neighbour does not show.
+    pub fn unseen(&self) -> f64 {
+        self.outside + self.hidden
     }
 }
-
-/// Share of the pixels of something that moved which are traced, around its outline and where it covers what stood still.
-const MOVED_ANEW: f64 = 0.5;
 
 /// Measures each step of a path; one fewer than frames.
 pub fn steps(path: &[PathFrame]) -> Vec<Step> {
     path.windows(2)
-        .map(|pair| {
-            let (earlier, later) = (&pair[0], &pair[1]);
-            let (new_forward, forward_pixels) = unseen(later, earlier);
-            let (new_backward, backward_pixels) = unseen(earlier, later);
-            Step {
-                new_forward: new_forward + later.moved * MOVED_ANEW,
-                new_backward: new_backward + later.moved * MOVED_ANEW,
-                pixels: 0.5 * (forward_pixels + backward_pixels),
-            }
+        .map(|pair| Step {
+            forward: Change { moved: pair[1].moved, ..change(&pair[1], &pair[0], 0) },
+            backward: Change { moved: pair[1].moved, ..change(&pair[0], &pair[1], 1) },
         })
         .collect()
 }
 
-/// Share of what `frame` sees that `neighbour` does not, and how far in pixels the rest moves between them.
-fn unseen(frame: &PathFrame, neighbour: &PathFrame) -> (f64, f64) {
+/// Samples that move less than this, in pixels, are kept as they are wherever they lie.
+const STILL: f64 = 1.0 / 256.0;
+
+/// Camera moves shorter than this share of the nearest depth are pure rotations: nothing new comes in before what is seen.
+const TURN: f64 = 1e-6;
+
+/// What `frame` shows, compared with `neighbour`: the frame before it (0) or after it (1).
+fn change(frame: &PathFrame, neighbour: &PathFrame, which: usize) -> Change {
+    // As inference does: the nearest of what the neighbour saw, and how near it is now.
+    let depths = neighbour.probe.iter().filter(|p| p.z.is_finite());
+    let depths = depths.map(|p| (p.position - frame.view.eye).dot(frame.view.forward));
+    let nearest = depths.filter(|&z| z > frame.view.lens.near.max(0.0)).fold(f64::INFINITY, f64::min);
+    let travels = frame.view.eye.distance(neighbour.view.eye) > TURN * nearest && nearest.is_finite();
     let raster_from_world = neighbour.view.raster_from_world(DVec3::ZERO);
-    let (columns, rows) = PathFrame::PROBE;
-    let (w, h) = (f64::from(neighbour.view.width), f64::from(neighbour.view.height));
-    let (mut new, mut moved, mut seen) = (0usize, 0.0, 0usize);
+    let size = DVec2::new(f64::from(neighbour.view.width), f64::from(neighbour.view.height));
+    let project = |position: DVec3, z: f64| {
+        let r = raster_from_world * position.extend(if z.is_finite() { 1.0 } else { 0.0 });
+        (r.w > 0.0).then(|| r.truncate().truncate() / r.w)
+    };
+    let on_image = |position: DVec3, z: f64| {
+        project(position, z).filter(|at| at.cmpge(DVec2::ZERO).all() && at.cmplt(size).all())
+    };
+    let mut sum = Change::default();
+    let mut seen = 0.0;
     for (point, (x, y)) in frame.probe.iter().zip(PathFrame::probe_positions(&frame.view)) {
-        let weight = if point.z.is_finite() { 1.0 } else { 0.0 };
-        let r = raster_from_world * point.position.extend(weight);
-        let (px, py) = (r.x / r.w, r.y / r.w);
-        if !(r.w > 0.0 && px >= 0.0 && py >= 0.0 && px < w && py < h) {
-            new += 1;
+        let Some(at) = on_image(point.position, point.z) else {
+            sum.outside += 1.0;
+            continue;
+        };
+        if point.hidden[which] {
+            sum.hidden += 1.0;
             continue;
         }
-        // Seen by the neighbour unless something stands well before it in the same cell of its probe.
-        let cell =
-            (py / h * f64::from(rows)) as usize * columns as usize + (px / w * f64::from(columns)) as usize;
-        let blocker = neighbour.probe.get(cell).map_or(f64::INFINITY, |p| p.z);
-        let z = if weight > 0.0 { r.z } else { f64::INFINITY };
-        let still = (px - x).hypot(py - y) < 1.0;
-        if blocker < z * 0.8 && !still {
-            new += 1;
-        } else {
-            moved += (px - x).hypot(py - y);
-            seen += 1;
+        let moved = at.distance(DVec2::new(x, y));
+        sum.pixels += moved;
+        seen += 1.0;
+        let ray = frame.view.ray(x, y);
+        if travels && on_image(ray.origin + ray.direction * nearest, nearest).is_none() {
+            sum.contested += 1.0;
+        } else if point.is_edge {
+            sum.edges += f64::from(u8::from(moved > STILL));
+        } else if let [Some(right), Some(below)] = point.beside.map(|p| project(p, point.z)) {
+            // How many of the neighbour's pixels, and so samples, fall on one of this frame.
+            let samples = (right - at).perp_dot(below - at).abs();
+            sum.stretched += (1.0 - samples).max(0.0);
         }
     }
-    (new as f64 / frame.probe.len().max(1) as f64, moved / seen.max(1) as f64)
+    let all = frame.probe.len().max(1) as f64;
+    Change {
+        outside: sum.outside / all,
+        hidden: sum.hidden / all,
+        contested: sum.contested / all,
+        stretched: sum.stretched / all,
+        edges: sum.edges / all,
+        moved: 0.0,
+        pixels: sum.pixels / f64::max(seen, 1.0),
+    }
 }
 
 /// A step so many times as long as the ones beside it is a jump. A hard stop from a fast move stays under it if the move
@@ -128,7 +170,7 @@ pub fn find_cuts(path: &[PathFrame], steps: &[Step], named: &[i64]) -> Vec<i64> 
         let depth = median_depth(&path[i]);
         let leaps = travel(i) > JUMP * around(i, &travel) && travel(i) > 0.05 * depth;
         let whirls = turn(i) > JUMP * around(i, &turn) && turn(i) > 10f64.to_radians();
-        (leaps || whirls) && steps[i].new_forward.max(steps[i].new_backward) > 0.1
+        (leaps || whirls) && steps[i].forward.unseen().max(steps[i].backward.unseen()) > 0.1
     };
     (0..steps.len())
         .map(|i| (i, path[i + 1].frame))

@@ -1,33 +1,24 @@
 //! Segments by dynamic programming over predicted cost.
 
-use super::Step;
+use super::{Change, Step, Weights};
 
-/// Cost of a frame traced in full is 1. What an inferred frame costs beside its traced share: projecting, walking
-/// lines, cleaning up.
-const INFERENCE: f64 = 0.12;
-
-/// Share of pixels that samples carried on lose in the end, at little and at much motion. One sample a pixel, pushed
-/// forward frame after frame, tends to a random pattern: the price of the half-pixel guarantee.
-const DECAYED: [f64; 2] = [0.25, 0.34];
-
-/// Motion in pixels a frame at which the second of [`DECAYED`] is reached.
-const MUCH_MOTION: f64 = 30.0;
-
-/// Share of the way to that pattern which one step goes at most, and the motion that goes most of it. Fitted, with the
-/// two above, to frames of an interior dolly at 1-30 pixels a frame and a walk through an atrium at 3-35.
-const STEP_DECAY: f64 = 0.4;
-const DECAY_MOTION: f64 = 10.0;
-
-/// Share of pixels at the edges of surfaces, which are cast in every frame where samples are centred.
-const EDGES: f64 = 0.15;
-
-/// Predicted costs of the frames inferred outward from one key frame.
+/// Predictions for the frames inferred outward from one key frame.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Chain {
-    /// Traced share of the 1st, 2nd, ... frame after the key, up to where inference becomes dearer than tracing.
-    forward: Vec<f64>,
+    /// Cost of the key frame. Costs are in the mean cost of a frame of the sequence that is traced in full.
+    key: f64,
+    /// The 1st, 2nd, ... frame after the key, up to where inference becomes dearer than tracing.
+    forward: Vec<Inferred>,
     /// The same before the key.
-    backward: Vec<f64>,
+    backward: Vec<Inferred>,
+}
+
+/// Prediction for an inferred frame.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Inferred {
+    /// Share of its pixels that are traced.
+    traced: f64,
+    cost: f64,
 }
 
 /// A segment by its frames' positions in the shot.
@@ -42,35 +33,46 @@ pub struct Range {
 }
 
 impl Chain {
-    /// The chains of every possible key frame of a shot with these steps, of segments up to `others` frames besides
-    /// the key: at most half of them before it, so that together they keep to the length.
-    pub fn of_shot(steps: &[Step], others: usize, centred: bool) -> Vec<Self> {
-        let predict = |steps: &mut dyn Iterator<Item = (f64, f64)>, longest: usize| {
-            let mut order = 1.0;
-            let chain = steps.take(longest).map_while(|(new, pixels)| {
-                order *= (-STEP_DECAY * (1.0 - (-pixels / DECAY_MOTION).exp())).exp();
-                let decayed = DECAYED[0] + (DECAYED[1] - DECAYED[0]) * (pixels / MUCH_MOTION).min(1.0);
-                let traced = new + if centred { EDGES } else { decayed * (1.0 - order) };
-                let traced = traced.min(1.0);
-                (traced <= Step::DEAR).then_some(traced)
+    /// The chains of every possible key frame of a shot with these steps, whose traced pixels take so many shadow rays,
+    /// frame by frame. Segments are of up to `others` frames besides the key: at most half of them before it, so that
+    /// together they keep to the length. `unit` camera rays a pixel are a cost of 1.
+    pub fn of_shot(
+        steps: &[Step],
+        shadow_rays: &[f64],
+        others: usize,
+        weights: &Weights,
+        unit: f64,
+    ) -> Vec<Self> {
+        let full = |frame: usize| Weights::traced_cost(shadow_rays[frame]);
+        let predict = |reach: &mut dyn Iterator<Item = (usize, Change)>| {
+            let (frames, changes): (Vec<usize>, Vec<Change>) = reach.unzip();
+            let each = frames.into_iter().zip(weights.traced(changes));
+            let priced = each.map(|(frame, traced)| {
+                (weights.predicted_cost(traced, shadow_rays[frame]), traced, full(frame))
             });
-            chain.collect::<Vec<_>>()
+            let worth = priced.take_while(|(cost, _, full)| cost < full);
+            worth.map(|(cost, traced, _)| Inferred { traced, cost: cost / unit }).collect()
         };
-        (0..=steps.len())
-            .map(|key| {
-                let mut after = steps[key..].iter().map(|s| (s.new_forward, s.pixels));
-                let mut before = steps[..key].iter().rev().map(|s| (s.new_backward, s.pixels));
-                Self {
-                    forward: predict(&mut after, others - others / 2),
-                    backward: predict(&mut before, others / 2),
-                }
-            })
-            .collect()
+        let chain = |key: usize| {
+            let after = steps[key..].iter().map(|s| s.forward);
+            let before = steps[..key].iter().rev().map(|s| s.backward);
+            Self {
+                key: full(key) / unit,
+                forward: predict(&mut (key + 1..).zip(after).take(others - others / 2)),
+                backward: predict(&mut (0..key).rev().zip(before).take(others / 2)),
+            }
+        };
+        (0..shadow_rays.len()).map(chain).collect()
+    }
+
+    /// True if the frame after the key may be inferred from it.
+    pub fn goes_on(&self) -> bool {
+        !self.forward.is_empty()
     }
 
     /// Share of pixels predicted to be traced in the frame at `offset` from the key.
     pub fn predicted(&self, offset: isize) -> f64 {
-        let of = |chain: &[f64]| chain.get(offset.unsigned_abs() - 1).copied().unwrap_or(1.0);
+        let of = |chain: &[Inferred]| chain.get(offset.unsigned_abs() - 1).map_or(1.0, |i| i.traced);
         match offset {
             0 => 1.0,
             1.. => of(&self.forward),
@@ -96,15 +98,15 @@ impl Division {
             if cost[key] > budget {
                 break;
             }
-            let (mut open, mut first, mut spent) = (cost[key] + 1.0, key, 1.0);
-            for (back, traced) in chain.backward.iter().take(key).enumerate() {
-                spent += INFERENCE + traced;
+            let (mut open, mut first, mut spent) = (cost[key] + chain.key, key, chain.key);
+            for (back, inferred) in chain.backward.iter().take(key).enumerate() {
+                spent += inferred.cost;
                 let start = key - back - 1;
                 if cost[start] + spent < open {
                     (open, first) = (cost[start] + spent, start);
                 }
             }
-            let forward = chain.forward.iter().take(chains.len() - key - 1).map(|traced| INFERENCE + traced);
+            let forward = chain.forward.iter().take(chains.len() - key - 1).map(|i| i.cost);
             let mut total = open;
             for (ahead, step) in std::iter::once(0.0).chain(forward).enumerate() {
                 total += step;
@@ -197,16 +199,17 @@ mod tests {
 
     /// A camera that moves alike in every step, seeing so much of each frame anew.
     fn steady(frames: usize, new: f64) -> Vec<Chain> {
-        let step = Step { new_forward: new, new_backward: new, pixels: 3.0 };
-        Chain::of_shot(&vec![step; frames - 1], 64, false)
+        let change = Change { outside: new, pixels: 3.0, ..Change::default() };
+        let step = Step { forward: change, backward: change };
+        let unit = Weights::traced_cost(2.0);
+        Chain::of_shot(&vec![step; frames - 1], &vec![2.0; frames], 64, &Weights::HALF_PIXEL, unit)
     }
 
     fn cost(chains: &[Chain], range: &Range) -> f64 {
-        let of = |i: usize| match i as isize - range.key as isize {
-            0 => 1.0,
-            offset => INFERENCE + chains[range.key].predicted(offset),
-        };
-        (range.first..=range.last).map(of).sum()
+        let chain = &chains[range.key];
+        let before = chain.backward[..range.key - range.first].iter();
+        let after = chain.forward[..range.last - range.key].iter();
+        chain.key + before.chain(after).map(|i| i.cost).sum::<f64>()
     }
 
     #[test]
