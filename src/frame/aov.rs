@@ -70,8 +70,8 @@ impl Aov {
                 size_of::<[f32; 3]>()
             }
             Self::Lights => lights * size_of::<[f32; 3]>(),
-            // Objects and materials: a number in the frame, two ranks of identifier and coverage in the file.
-            Self::Crypto => 2 * (size_of::<u32>() + size_of::<[f32; 4]>()),
+            // Objects and materials: two ranks of identifier and coverage in the file; less in the frame, a number.
+            Self::Crypto => 2 * size_of::<[f32; 4]>(),
         }
     }
 }

@@ -41,13 +41,13 @@ pub struct Weights {
 impl Weights {
     /// Of [`Quality::HalfPixel`]: nothing is cast at edges, but samples scatter.
     pub const HALF_PIXEL: Self = Self {
-        contested: 0.75,
+        contested: 1.0,
         stretched: 1.0,
         edges: 0.0,
         moved: 0.5,
         missed: 0.45,
         scatter: 0.144,
-        scatter_pixels: 2.6,
+        scatter_pixels: 2.8,
         inference: 0.4,
         shadows: 0.96,
         proof: 0.0,
