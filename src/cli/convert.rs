@@ -346,6 +346,7 @@ fn report(
         },
         plan: plan.into(),
         frames,
+        predicted: plan.frames.iter().map(|f| (f.frame, f.predicted_traced)).collect(),
         runs,
         warnings: Vec::new(),
     })

@@ -9,6 +9,7 @@ use crate::scene::{Ignored, Rational};
 use crate::{Error, Result};
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
+use std::collections::BTreeMap;
 use std::path::Path;
 
 /// Everything that a report is made from.
@@ -26,6 +27,8 @@ pub struct ReportInput {
     pub plan: Plan,
     /// All frames of the run, in order.
     pub frames: Vec<FrameRecord>,
+    /// For each frame of the plan: the share of its pixels that was predicted to be traced.
+    pub predicted: BTreeMap<i64, f64>,
     /// The runs that made them, the one that reports last.
     pub runs: Vec<Run>,
     /// What the user was warned of.
@@ -236,6 +239,12 @@ pub struct FrameReport {
     pub from: Option<i64>,
     /// Pixels of each class, by its name.
     pub pixels: Map<String, Value>,
+    /// Share of pixels that the plan predicted to be traced; `None` outside the plan and for a right eye.
+    #[serde(default)]
+    pub predicted_traced: Option<f64>,
+    /// Share of pixels that were: all that are not reused.
+    #[serde(default)]
+    pub traced: f64,
     /// Rays cast.
     pub rays: RayCounts,
     /// Wall seconds; those of a skipped frame stand in an earlier run's report, and are 0 if there is none.
@@ -261,7 +270,7 @@ impl Report {
             scene: input.scene,
             plan: input.plan,
             totals,
-            frames: input.frames.iter().map(FrameReport::from).collect(),
+            frames: input.frames.iter().map(|record| FrameReport::new(record, &input.predicted)).collect(),
             runs: input.runs.into_iter().map(Run::rounded).collect(),
             warnings: input.warnings,
         }
@@ -301,7 +310,7 @@ impl Totals {
             }
         }
         let of_runs =
-            |part: fn(&RunSeconds) -> f64| microseconds(input.runs.iter().map(|r| part(&r.seconds)).sum());
+            |part: fn(&RunSeconds) -> f64| millionths(input.runs.iter().map(|r| part(&r.seconds)).sum());
         let StageSeconds { infer, trace, enhance, write } = rounded(sum.seconds);
         Self {
             frames: input.frames.len(),
@@ -330,10 +339,8 @@ impl FrameReport {
     pub fn id(&self) -> FrameId {
         FrameId { number: self.frame, eye: self.eye }
     }
-}
 
-impl From<&FrameRecord> for FrameReport {
-    fn from(record: &FrameRecord) -> Self {
+    fn new(record: &FrameRecord, predicted: &BTreeMap<i64, f64>) -> Self {
         let (kind, from) = match record.kind {
             FrameKind::Traced => ("traced", None),
             FrameKind::Inferred { from } => ("inferred", Some(from)),
@@ -344,12 +351,25 @@ impl From<&FrameRecord> for FrameReport {
             kind: kind.into(),
             from,
             pixels: pixels_by_name(&record.stats.pixels),
+            predicted_traced: predicted
+                .get(&record.id.number)
+                .filter(|_| record.id.eye != Some(StereoEye::Right))
+                .map(|&share| millionths(share)),
+            traced: traced_share(&record.stats.pixels),
             rays: record.stats.rays,
             seconds: rounded(record.stats.seconds),
             hidden: record.stats.hidden,
             skipped: record.skipped,
         }
     }
+}
+
+/// Share of pixels for which a camera ray was cast.
+fn traced_share(pixels: &[u64; PixelClass::COUNT]) -> f64 {
+    let reused: u64 =
+        PixelClass::ALL.iter().filter(|class| class.is_reused()).map(|&c| pixels[c as usize]).sum();
+    let all: u64 = pixels.iter().sum();
+    millionths((all - reused) as f64 / all.max(1) as f64)
 }
 
 /// All classes by name, in the order of the contract: traced pixels last.
@@ -360,16 +380,16 @@ fn pixels_by_name(pixels: &[u64; PixelClass::COUNT]) -> Map<String, Value> {
 
 fn rounded(seconds: StageSeconds) -> StageSeconds {
     StageSeconds {
-        infer: microseconds(seconds.infer),
-        trace: microseconds(seconds.trace),
-        enhance: microseconds(seconds.enhance),
-        write: microseconds(seconds.write),
+        infer: millionths(seconds.infer),
+        trace: millionths(seconds.trace),
+        enhance: millionths(seconds.enhance),
+        write: millionths(seconds.write),
     }
 }
 
 /// Clocks tell no more, and seventeen digits are hard to read. What is not finite is 0: JSON has no word for it.
-pub(super) fn microseconds(seconds: f64) -> f64 {
-    if seconds.is_finite() { (seconds * 1e6).round() / 1e6 } else { 0.0 }
+pub(super) fn millionths(value: f64) -> f64 {
+    if value.is_finite() { (value * 1e6).round() / 1e6 } else { 0.0 }
 }
 
 #[cfg(test)]
@@ -394,6 +414,7 @@ mod tests {
                 record(-1, FrameKind::Traced, stats(PixelClass::Traced, None)),
                 record(0, FrameKind::Inferred { from: -1 }, stats(PixelClass::Good, Some(3))),
             ],
+            predicted: [(-1, 1.0)].into(),
             runs: vec![Run {
                 seconds: RunSeconds { wall: f64::NAN, ..RunSeconds::default() },
                 ..Run::default()
@@ -445,6 +466,8 @@ mod tests {
         );
         assert_eq!(report.totals.pixels["traced"], 100);
         assert_eq!(report.totals.pixels["good"], 100);
+        let shares: Vec<_> = report.frames.iter().map(|f| (f.predicted_traced, f.traced)).collect();
+        assert_eq!(shares, [(Some(1.0), 1.0), (None, 0.0)]);
         assert_eq!(report.totals.rays.primary, 14);
         assert_eq!(report.totals.hidden, Some(3));
         assert_eq!(report.frames[1].seconds.infer, 0.123_457);

@@ -4,7 +4,7 @@
 //! A frame's counts are in its file, but no times, or files would differ from run to run. Times stand in the report of the
 //! run that rendered it, so a run that skips frames looks for such reports in the folder that its own will be in.
 
-use super::report::{FrameReport, Report, microseconds};
+use super::report::{FrameReport, Report, millionths};
 use super::{FrameRecord, SettingsHash};
 use crate::frame::{FrameId, StageSeconds};
 use serde::{Deserialize, Serialize};
@@ -44,7 +44,7 @@ impl Run {
     pub(super) fn rounded(mut self) -> Self {
         let RunSeconds { import, accel, plan, wall } = &mut self.seconds;
         for seconds in [import, accel, plan, wall] {
-            *seconds = microseconds(*seconds);
+            *seconds = millionths(*seconds);
         }
         self
     }

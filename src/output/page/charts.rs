@@ -91,7 +91,21 @@ impl Report {
                 None => "traced".into(),
             },
         };
-        format!("Frame {}: {made}{}", frame.id(), if frame.skipped { ", was there already" } else { "" })
+        let share = match (frame.from, frame.predicted_traced) {
+            (Some(_), Some(predicted)) => {
+                format!(
+                    ", {:.0} % of pixels traced, {:.0} % predicted",
+                    100.0 * frame.traced,
+                    100.0 * predicted
+                )
+            }
+            _ => String::new(),
+        };
+        format!(
+            "Frame {}: {made}{share}{}",
+            frame.id(),
+            if frame.skipped { ", was there already" } else { "" }
+        )
     }
 
     fn classes(&self) -> String {
