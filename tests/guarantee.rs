@@ -11,7 +11,7 @@ use buzz::frame::{Frame, FrameKind};
 use buzz::import::{ImportOptions, import};
 use buzz::measure::{Exposure, psnr};
 use buzz::output::MemorySink;
-use buzz::plan::{LONGEST_SEGMENT, Plan, PlanOptions, plan};
+use buzz::plan::{LONGEST_SEGMENT, Plan, PlanOptions, Segment, plan};
 use buzz::scene::Scene;
 use buzz::sequence::{Quality, Settings, Unwatched, camera_path, render_sequence};
 use std::collections::BTreeSet;
@@ -23,11 +23,13 @@ fn resolution() -> (u32, u32) {
     (width.parse().unwrap(), height.parse().unwrap())
 }
 
-/// Whole segments around the start, so that chains are honest: 16 frames unless all are asked for.
+/// Chains of twelve frames on either side of the first key frame that has others, or of the whole range if asked for.
 fn some_frames(plan: &Plan) -> BTreeSet<i64> {
     let all = std::env::var("BUZZ_FRAMES").is_ok_and(|f| f == "all");
-    let first = plan.frames[0].frame;
-    plan.segments.iter().filter(|s| all || s.first < first + 12).flat_map(|s| s.first..=s.last).collect()
+    let near = |s: &&Segment| all || s.first < s.last;
+    let reach = if all { i64::from(LONGEST_SEGMENT) } else { 12 };
+    let chains = plan.segments.iter().filter(near).take(if all { usize::MAX } else { 1 });
+    chains.flat_map(|s| s.first.max(s.key - reach)..=s.last.min(s.key + reach)).collect()
 }
 
 fn render(scene: &Scene, plan: &Plan, frames: &BTreeSet<i64>, jitter: Option<u64>) -> Vec<Frame> {
