@@ -28,30 +28,33 @@ impl Accel {
         Displaced { placements, deformed: deformed.collect() }
     }
 
-    /// The triangles of an instance, relative to the origin; none of one that is not placed.
-    pub fn triangles<'a>(
-        &'a self,
-        scene: &'a Scene,
-        instance: usize,
-    ) -> impl Iterator<Item = [Vec3; 3]> + Clone + use<'a> {
+    /// An instance as rays meet it.
+    pub fn posed<'a>(&'a self, scene: &'a Scene, instance: usize) -> Posed<'a> {
         let mesh = &scene.meshes[scene.instances[instance].mesh];
-        triangles(mesh, self.positions(instance, mesh), &self.placements[instance])
+        Posed { mesh, positions: self.positions(instance, mesh), placement: &self.placements[instance] }
     }
 }
 
-/// Triangles of an instance of `mesh` that stands at `placement`; of a shape, those of the box around it.
-fn triangles<'a>(
+/// An instance in one pose.
+#[derive(Clone, Copy)]
+pub struct Posed<'a> {
     mesh: &'a Mesh,
     positions: &'a [Vec3],
     placement: &'a Placement,
-) -> impl Iterator<Item = [Vec3; 3]> + Clone + use<'a> {
-    let numbers = if placement.present { mesh.triangles.as_slice() } else { &[] };
-    let bounds = mesh.shape.as_ref().filter(|_| placement.present).map(|shape| shape.bounds());
-    let object = numbers.iter().map(|t| t.map(|i| positions[i as usize]));
-    let render_from_object = placement.render_from_object;
-    object
-        .chain(bounds.into_iter().flat_map(sides))
-        .map(move |t| t.map(|p| render_from_object.transform_point3(p)))
+}
+
+impl<'a> Posed<'a> {
+    /// Its triangles, relative to the origin; of a shape, those of the box around it. None if it is not placed.
+    pub fn triangles(self) -> impl Iterator<Item = [Vec3; 3]> + Clone + use<'a> {
+        let Self { mesh, positions, placement } = self;
+        let numbers = if placement.present { mesh.triangles.as_slice() } else { &[] };
+        let bounds = mesh.shape.as_ref().filter(|_| placement.present).map(|shape| shape.bounds());
+        let object = numbers.iter().map(|t| t.map(|i| positions[i as usize]));
+        let render_from_object = placement.render_from_object;
+        object
+            .chain(bounds.into_iter().flat_map(sides))
+            .map(move |t| t.map(|p| render_from_object.transform_point3(p)))
+    }
 }
 
 /// Farther away than this a shape without end is taken to end, metres: voxels around it are as coarse as its box is large.
@@ -92,14 +95,10 @@ impl Displaced {
         outward.dot(Vec3A::from(direction)) <= 0.0
     }
 
-    /// See [`Accel::triangles`].
-    pub fn triangles<'a>(
-        &'a self,
-        scene: &'a Scene,
-        instance: usize,
-    ) -> impl Iterator<Item = [Vec3; 3]> + Clone + use<'a> {
+    /// An instance in this pose.
+    pub fn posed<'a>(&'a self, scene: &'a Scene, instance: usize) -> Posed<'a> {
         let mesh = &scene.meshes[scene.instances[instance].mesh];
-        triangles(mesh, self.positions(instance, mesh), &self.placements[instance])
+        Posed { mesh, positions: self.positions(instance, mesh), placement: &self.placements[instance] }
     }
 
     /// Corners of the triangle that a point lies on, as the instance has them before it is placed.

@@ -24,7 +24,7 @@ mod wide;
 use crate::frame::SurfaceRef;
 use crate::scene::{Mesh, Pose, Scene};
 use deform::{Deformed, Shape, affine, is_deformable};
-pub use displaced::Displaced;
+pub use displaced::{Displaced, Posed};
 use fused::Fused;
 use glam::{Affine3A, DAffine3, DVec3, Mat3A, Vec3, Vec3A, Vec4};
 pub use intersect::{Ray, RayHit, Sides};

@@ -3,8 +3,9 @@
 //! A sample rides on its surface: before anything is projected, samples of what has moved are put where their points are
 //! now. What moved in front of other samples is found by voxels: those that a moved surface is in now are *entered*, those
 //! that it was in before are *left*. A line from a sample to the eye through an entered voxel clears the pixel; voxels that
-//! the body which carries the sample has entered count once the line has come out of them. A line from a sample to a light through an entered voxel, where the light had arrived, or through one that was left, where it had not,
-//! lets that light's ray be cast anew.
+//! the body which carries the sample has entered count once the line has come out of them. A line from a sample to a light
+//! lets that light's ray be cast anew if it passes through an entered voxel where the light had arrived, or through one
+//! that was left where it had not.
 //!
 //! Departure: the paper stores t for each light, up to which its shadow ray is known to be free, to walk no further. We
 //! store a bit; so a shadow that something else casts too is asked for more often than need be.

@@ -50,8 +50,8 @@ impl<'a> SceneMotion<'a> {
         let slack = |p| projector.pixel_width(p);
         let displaced = accel.displaced(scene, before);
         let body = |instances: &Vec<usize>| Body {
-            entered: Voxels::new(instances.iter().flat_map(|&i| accel.triangles(scene, i)), slack),
-            left: Voxels::new(instances.iter().flat_map(|&i| displaced.triangles(scene, i)), slack),
+            entered: Voxels::new(instances.iter().flat_map(|&i| accel.posed(scene, i).triangles()), slack),
+            left: Voxels::new(instances.iter().flat_map(|&i| displaced.posed(scene, i).triangles()), slack),
         };
         let members: Vec<_> = members.values().collect();
         let bodies = members.into_par_iter().map(body).collect();
