@@ -25,6 +25,15 @@ impl Exposure {
         [r, g, b].map(|v| srgb(v * self.scale))
     }
 
+    /// The linear value that is shown as each byte.
+    pub fn linear_from_byte(self) -> [f32; 256] {
+        std::array::from_fn(|byte| {
+            let v = byte as f32 / 255.0;
+            let linear = if v <= 0.040_45 { v / 12.92 } else { ((v + 0.055) / 1.055).powf(2.4) };
+            linear / self.scale
+        })
+    }
+
     /// [`Exposure::encode`] of a picture.
     pub fn encode_all(self, pixels: &[[f32; 4]]) -> Vec<[f32; 3]> {
         pixels.iter().map(|&pixel| self.encode(pixel)).collect()

@@ -27,6 +27,15 @@ pub fn beauty(pixels: &[[f32; 4]], width: u32, exposure: Exposure) -> Option<Rgb
     draw(pixels, width, |&pixel| exposure.encode(pixel).map(to_byte))
 }
 
+/// A picture that was made at one exposure, as it is shown at another.
+pub fn exposed(picture: &RgbImage, from: Exposure, to: Exposure) -> RgbImage {
+    let linear = from.linear_from_byte();
+    let shown = linear.map(|v| to_byte(to.encode([v; 4])[0]));
+    let mut picture = picture.clone();
+    picture.iter_mut().for_each(|byte| *byte = shown[usize::from(*byte)]);
+    picture
+}
+
 /// Pixel classes in [`CLASS_COLORS`].
 pub fn classes(class: &[u8], width: u32) -> Option<RgbImage> {
     draw(class, width, |&class| CLASS_COLORS.get(usize::from(class)).copied().unwrap_or([0; 3]))
@@ -123,6 +132,16 @@ fn to_byte(value: f32) -> u8 {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_picture_exposed_anew_is_as_if_it_had_been_made_so() {
+        let pixels: Vec<[f32; 4]> = (0..256).map(|i| [i as f32 / 256.0; 4]).collect();
+        let (dark, bright) = (Exposure { scale: 0.5 }, Exposure { scale: 1.0 });
+        let made = |exposure| beauty(&pixels, 256, exposure).unwrap();
+        assert_eq!(exposed(&made(bright), bright, bright), made(bright));
+        let darkened = exposed(&made(bright), bright, dark);
+        assert!(darkened.iter().zip(made(dark).iter()).all(|(a, b)| a.abs_diff(*b) <= 1));
+    }
 
     #[test]
     fn layers_become_pictures() {

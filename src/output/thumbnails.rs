@@ -8,10 +8,9 @@ use crate::frame::{Frame, FrameId, StageSeconds, StereoEye};
 use crate::measure::{Exposure, Percentile, picture, read_frame};
 use crate::sequence::FrameSink;
 use base64::Engine;
-use half::f16;
 use image::codecs::jpeg::JpegEncoder;
 use image::codecs::webp::WebPEncoder;
-use image::{ExtendedColorType, ImageEncoder, RgbImage};
+use image::{ExtendedColorType, ImageEncoder, ImageFormat, RgbImage};
 use rayon::prelude::*;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
@@ -22,6 +21,10 @@ pub const MOST_FRAMES: usize = 200;
 pub const SIDE: usize = 256;
 /// Bytes that all pictures take in a page, at most.
 pub const MOST_BYTES: usize = 8 << 20;
+
+/// JPEG quality of what is shown, and of what is exposed anew before it is.
+const SHOWN: u8 = 82;
+const KEPT: u8 = 92;
 
 /// A frame's pictures as data URIs; none for layers that the frame does not have.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -36,7 +39,8 @@ pub struct Thumbnail {
     pub depth: Option<String>,
 }
 
-/// The small pictures of a run, linear until all frames are known and with them the exposure.
+/// The small pictures of a run. They are kept encoded, or a long run would hold a hundred megabytes of them; the beauty
+/// under its frame's own exposure, until all frames are known and with them the sequence's.
 #[derive(Debug, Default)]
 pub struct Thumbnails {
     chosen: BTreeSet<i64>,
@@ -44,13 +48,13 @@ pub struct Thumbnails {
     percentile: Percentile,
 }
 
-/// A frame made small.
+/// A frame made small: JPEG and WebP files.
 #[derive(Debug)]
 struct Small {
-    width: u32,
-    color: Vec<[f16; 4]>,
-    depth: Vec<f32>,
-    class: Vec<u8>,
+    beauty: Vec<u8>,
+    exposure: Exposure,
+    depth: Option<Vec<u8>>,
+    class: Option<Vec<u8>>,
 }
 
 impl Thumbnails {
@@ -74,23 +78,27 @@ impl Thumbnails {
             return;
         }
         let grid = Grid::new(width, color.len() / width);
-        let color: Vec<[f32; 4]> = grid.means(color);
-        self.percentile.add(&color);
-        let small = Small {
-            width: grid.columns as u32,
-            color: color.into_iter().map(|c| c.map(f16::from_f32)).collect(),
-            depth: grid.centers(depth),
-            class: grid.centers(class),
+        let (columns, color) = (grid.columns as u32, grid.means(color));
+        let mut percentile = Percentile::default();
+        percentile.add(&color);
+        self.percentile.merge(&percentile);
+        let exposure = Exposure::from_p99(percentile.get(0.99));
+        let Some(beauty) = picture::beauty(&color, columns, exposure).and_then(|p| jpeg(&p, KEPT)) else {
+            return;
         };
-        self.small.insert(number, small);
+        let (depth, class) = (grid.centers(depth), grid.centers(class));
+        let depth = picture::depth(&depth, columns).filter(|_| !depth.is_empty());
+        let class = picture::classes(&class, columns).filter(|_| !class.is_empty());
+        let depth = depth.and_then(|p| jpeg(&p, SHOWN));
+        self.small.insert(number, Small { beauty, exposure, depth, class: class.and_then(|p| webp(&p)) });
     }
 
     /// The beauty of each frame, under one exposure.
     pub fn beauties(&self) -> BTreeMap<i64, RgbImage> {
         let exposure = Exposure::from_p99(self.percentile.get(0.99));
         let draw = |small: &Small| {
-            let color: Vec<[f32; 4]> = small.color.iter().map(|c| c.map(f16::to_f32)).collect();
-            picture::beauty(&color, small.width, exposure)
+            let own = image::load_from_memory_with_format(&small.beauty, ImageFormat::Jpeg).ok()?;
+            Some(picture::exposed(&own.into_rgb8(), small.exposure, exposure))
         };
         self.small.par_iter().filter_map(|(&number, small)| Some((number, draw(small)?))).collect()
     }
@@ -103,13 +111,11 @@ impl Thumbnails {
             .into_par_iter()
             .filter_map(|(frame, beauty)| {
                 let small = self.small.get(&frame)?;
-                let class = picture::classes(&small.class, small.width).filter(|_| !small.class.is_empty());
-                let depth = picture::depth(&small.depth, small.width).filter(|_| !small.depth.is_empty());
                 Some(Thumbnail {
                     frame,
-                    beauty: jpeg(&beauty)?,
-                    class: class.and_then(|c| webp(&c)),
-                    depth: depth.and_then(|d| jpeg(&d)),
+                    beauty: uri("jpeg", &jpeg(&beauty, SHOWN)?),
+                    class: small.class.as_ref().map(|class| uri("webp", class)),
+                    depth: small.depth.as_ref().map(|depth| uri("jpeg", depth)),
                 })
             })
             .collect();
@@ -172,19 +178,19 @@ impl Grid {
 }
 
 /// Photographs: small, and nobody measures them.
-fn jpeg(picture: &RgbImage) -> Option<String> {
+fn jpeg(picture: &RgbImage, quality: u8) -> Option<Vec<u8>> {
     let mut bytes = Vec::new();
-    JpegEncoder::new_with_quality(&mut bytes, 82).encode_image(picture).ok()?;
-    Some(uri("jpeg", &bytes))
+    JpegEncoder::new_with_quality(&mut bytes, quality).encode_image(picture).ok()?;
+    Some(bytes)
 }
 
 /// Pictures of few colours: exact, and half of what PNG takes.
-fn webp(picture: &RgbImage) -> Option<String> {
+fn webp(picture: &RgbImage) -> Option<Vec<u8>> {
     let mut bytes = Vec::new();
     let (width, height) = picture.dimensions();
     let encoder = WebPEncoder::new_lossless(&mut bytes);
     encoder.write_image(picture, width, height, ExtendedColorType::Rgb8).ok()?;
-    Some(uri("webp", &bytes))
+    Some(bytes)
 }
 
 fn uri(kind: &str, bytes: &[u8]) -> String {
@@ -236,6 +242,21 @@ mod tests {
         assert_eq!(grid.centers(&[1, 2, 3, 4, 5, 6]), [1, 2, 3, 4, 5, 6]);
         assert_eq!(grid.centers::<u8>(&[]), [0; 0]);
         assert_eq!((Grid::new(100_000, 10).columns, Grid::new(100_000, 10).rows), (256, 1));
+    }
+
+    #[test]
+    fn frames_are_shown_under_one_exposure_wherever_they_began() {
+        let frames: BTreeSet<i64> = (0..2).collect();
+        let mut thumbnails = Thumbnails::of(&frames);
+        let gray = |value: f32| vec![[value, value, value, 1.0]; 64 * 64];
+        thumbnails.add(0, 64, &gray(0.5), &[], &[]);
+        thumbnails.add(1, 64, &gray(0.125), &[], &[]);
+        let exposure = Exposure::from_p99(0.5);
+        for (frame, value) in [(0, 0.5), (1, 0.125)] {
+            let shown = 255.0 * exposure.encode([value; 4])[0];
+            let [found, ..] = thumbnails.beauties()[&frame].get_pixel(32, 32).0;
+            assert!((f32::from(found) - shown).abs() <= 2.0, "{found} for {shown}");
+        }
     }
 
     #[test]
