@@ -3,7 +3,7 @@
 use super::opacity::{self, CULL_BACK, EYE_PASS, EYE_TEST, MIRRORED, SHADOW_PASS, SHADOW_TEST};
 use super::placed_shape::PlacedShape;
 use super::tree::Bounds;
-use super::triangle::{ShearedRay, TreeTriangle, TriangleHit};
+use super::triangle::{ShearedRay, TreeTriangle, TriangleHit, TrianglePack};
 use super::wide::{Pending, SlabRay};
 use super::{Accel, Placed, PlacedTree};
 use crate::frame::SurfaceRef;
@@ -77,12 +77,16 @@ impl Accel {
         let ray = LocalRay { origin: origin + direction * start, direction, t_min: t_min - start };
         let slabs = SlabRay::new(ray.origin, ray.direction, ray.t_min);
         self.with_pending(|pending| {
-            self.upper.nearest(&slabs, nearest.hit.t - start, pending, |slot, _, pending| {
-                match &self.placed[slot] {
-                    Placed::Tree(tree) => {
-                        self.nearest_in(scene, tree, &ray, start, sides, &mut nearest, pending);
+            self.upper.nearest(&slabs, nearest.hit.t - start, pending, |leaf, _, pending| {
+                for placed in &self.placed[self.upper_leaves[leaf].clone()] {
+                    match placed {
+                        Placed::Tree(tree) => {
+                            self.nearest_in(scene, tree, &ray, start, sides, &mut nearest, pending);
+                        }
+                        Placed::Shape(shape) => {
+                            self.nearest_on(scene, shape, &ray, start, sides, &mut nearest)
+                        }
                     }
-                    Placed::Shape(shape) => self.nearest_on(scene, shape, &ray, start, sides, &mut nearest),
                 }
                 nearest.hit.t - start
             });
@@ -114,8 +118,10 @@ impl Accel {
         let m = &self.placement(index).render_from_object;
         let corners = mesh.triangles[surface.primitive as usize]
             .map(|i| Vec3::from(m.transform_point3a(positions[i as usize].into())));
-        let triangle = TreeTriangle::new(corners, surface.primitive, 0, 0);
-        let hit = ShearedRay::new(ray.origin, ray.direction).intersect(&triangle, ray.t_min, ray.t_max)?;
+        let triangle = TreeTriangle { corners, primitive: surface.primitive, part: 0, flags: 0 };
+        let pack = TrianglePack::new([triangle].iter());
+        let mut hits = ShearedRay::new(ray.origin, ray.direction).intersect(&pack, ray.t_min, ray.t_max);
+        let (_, hit) = hits.next()?;
         let flags = opacity::flags(scene, mesh);
         let present =
             flags & EYE_TEST == 0 || opacity::is_present_at(scene, mesh, surface.primitive, hit.u, hit.v);
@@ -134,20 +140,10 @@ impl Accel {
         let ray = LocalRay { origin: from + direction * start, direction, t_min: -start };
         let slabs = SlabRay::new(ray.origin, ray.direction, ray.t_min);
         !self.with_pending(|pending| {
-            self.upper.any(&slabs, t_max - start, pending, |slot, pending| {
-                let placed = match &self.placed[slot] {
-                    Placed::Tree(tree) => tree,
-                    Placed::Shape(shape) => return shape.blocks(scene, &ray, t_max - start),
-                };
-                let (tree, instances) = self.lower(placed);
-                let (local, on) = placed.local(&ray, &tree.bounds);
-                let (slabs, sheared) = local.prepare();
-                let t_max = t_max - start - on;
-                tree.wide.any(&slabs, t_max, pending, |i, _| {
-                    let triangle = &tree.triangles[i];
-                    sheared
-                        .intersect(triangle, local.t_min, t_max)
-                        .is_some_and(|hit| self.blocks(scene, instances, triangle, &hit))
+            self.upper.any(&slabs, t_max - start, pending, |leaf, pending| {
+                self.placed[self.upper_leaves[leaf].clone()].iter().any(|placed| match placed {
+                    Placed::Tree(tree) => self.blocks_in(scene, tree, &ray, t_max - start, pending),
+                    Placed::Shape(shape) => shape.blocks(scene, &ray, t_max - start),
                 })
             })
         })
@@ -182,31 +178,55 @@ impl Accel {
         let (local, on) = placed.local(ray, &tree.bounds);
         let (slabs, sheared) = local.prepare();
         let start = start + on;
-        tree.wide.nearest(&slabs, nearest.hit.t - start, pending, |i, t_max, _| {
-            let triangle = &tree.triangles[i];
-            let Some(mut hit) = sheared.intersect(triangle, local.t_min, t_max) else { return t_max };
-            let t = hit.t;
-            hit.t += start;
-            let instance = instances[triangle.part() as usize];
-            let found = (instance, triangle.primitive());
-            if hit.t >= nearest.hit.t && found >= (nearest.instance, nearest.primitive) {
-                return t_max;
-            }
-            let flags = triangle.flags();
-            hit.front ^= flags & MIRRORED != 0;
-            let culled = sides == Sides::Visible && !hit.front && flags & CULL_BACK != 0;
-            if culled || flags & EYE_PASS != 0 {
-                return t_max;
-            }
-            if flags & EYE_TEST != 0 {
-                let mesh = self.mesh(scene, instances, triangle);
-                if !opacity::is_present_at(scene, mesh, triangle.primitive(), hit.u, hit.v) {
-                    return t_max;
+        tree.wide.nearest(&slabs, nearest.hit.t - start, pending, |leaf, mut t_max, _| {
+            let pack = &tree.leaves[leaf];
+            for (lane, mut hit) in sheared.intersect(pack, local.t_min, t_max) {
+                let t = hit.t;
+                hit.t += start;
+                let found = (instances[pack.part(lane) as usize], pack.primitive(lane));
+                if t > t_max || hit.t >= nearest.hit.t && found >= (nearest.instance, nearest.primitive) {
+                    continue;
                 }
+                let flags = pack.flags(lane);
+                hit.front ^= flags & MIRRORED != 0;
+                let culled = sides == Sides::Visible && !hit.front && flags & CULL_BACK != 0;
+                if culled || flags & EYE_PASS != 0 {
+                    continue;
+                }
+                if flags & EYE_TEST != 0
+                    && !opacity::is_present_at(scene, mesh_of(scene, found.0), found.1, hit.u, hit.v)
+                {
+                    continue;
+                }
+                *nearest = Nearest { hit, instance: found.0, primitive: found.1 };
+                t_max = t;
             }
-            *nearest = Nearest { hit, instance: found.0, primitive: found.1 };
-            t
+            t_max
         });
+    }
+
+    /// True if anything in one placed group blocks light before `t_max`.
+    #[inline]
+    fn blocks_in(
+        &self,
+        scene: &Scene,
+        placed: &PlacedTree,
+        ray: &LocalRay,
+        t_max: f32,
+        pending: &mut [Pending],
+    ) -> bool {
+        let (tree, instances) = self.lower(placed);
+        let (local, on) = placed.local(ray, &tree.bounds);
+        let (slabs, sheared) = local.prepare();
+        tree.wide.any(&slabs, t_max - on, pending, |leaf, _| {
+            let pack = &tree.leaves[leaf];
+            sheared.intersect(pack, local.t_min, t_max - on).any(|(lane, hit)| {
+                let flags = pack.flags(lane);
+                let mesh = || mesh_of(scene, instances[pack.part(lane) as usize]);
+                let asks = |mesh| opacity::casts_shadow_at(scene, mesh, pack.primitive(lane), hit.u, hit.v);
+                flags & (SHADOW_TEST | SHADOW_PASS) == 0 || flags & SHADOW_TEST != 0 && asks(mesh())
+            })
+        })
     }
 
     /// Looks for something nearer on one shape; `start` is how far along the whole ray `ray` starts.
@@ -230,22 +250,10 @@ impl Accel {
             *nearest = Nearest { hit, instance, primitive };
         }
     }
+}
 
-    /// Whether a triangle that is hit casts a shadow.
-    fn blocks(&self, scene: &Scene, instances: &[u32], triangle: &TreeTriangle, hit: &TriangleHit) -> bool {
-        let flags = triangle.flags();
-        if flags & (SHADOW_TEST | SHADOW_PASS) == 0 {
-            return true;
-        }
-        flags & SHADOW_TEST != 0 && {
-            let mesh = self.mesh(scene, instances, triangle);
-            opacity::casts_shadow_at(scene, mesh, triangle.primitive(), hit.u, hit.v)
-        }
-    }
-
-    fn mesh<'a>(&self, scene: &'a Scene, instances: &[u32], triangle: &TreeTriangle) -> &'a Mesh {
-        &scene.meshes[scene.instances[instances[triangle.part() as usize] as usize].mesh]
-    }
+fn mesh_of(scene: &Scene, instance: u32) -> &Mesh {
+    &scene.meshes[scene.instances[instance as usize].mesh]
 }
 
 /// A ray in the space of a tree. Its direction is not normalised, so that its parameter is measured alike in all.

@@ -31,7 +31,8 @@ pub use intersect::{Ray, RayHit, Sides};
 use placed_shape::PlacedShape;
 use rayon::prelude::*;
 use std::collections::HashMap;
-use tree::{Bounds, Part, Tree, build};
+use std::ops::Range;
+use tree::{Bounds, Built, Part, Tree, build};
 use wide::WideTree;
 
 /// The scene as rays meet it. See the [module](self).
@@ -53,6 +54,8 @@ pub struct Accel {
     /// Shapes that no box can hold.
     endless: Vec<PlacedShape>,
     upper: WideTree,
+    /// What is in each leaf of the upper tree.
+    upper_leaves: Vec<Range<usize>>,
     /// Entries that a ray may have pending at once in both levels.
     pending: usize,
     bounds: Bounds,
@@ -129,6 +132,7 @@ impl Accel {
             placed: Vec::new(),
             endless: Vec::new(),
             upper: WideTree::default(),
+            upper_leaves: Vec::new(),
             pending: 0,
             bounds: Bounds::default(),
         }
@@ -226,14 +230,14 @@ impl Accel {
             all.include(b.max);
             all
         });
-        let (upper, order) = build(&bounds, self.bounds.reach());
+        let Built { tree: upper, order, leaves } = build(&bounds, self.bounds.reach());
         let lower = placed.iter().filter_map(|placed| match placed {
             Placed::Tree(tree) => Some(self.lower(tree).0.wide.pending()),
             Placed::Shape(_) => None,
         });
         let lower = lower.max();
         self.pending = upper.pending() + lower.unwrap_or(0);
-        self.upper = upper;
+        (self.upper, self.upper_leaves) = (upper, leaves);
         let mut slots: Vec<Option<Placed>> = placed.into_iter().map(Some).collect();
         self.placed = order.iter().filter_map(|&i| slots[i as usize].take()).collect();
     }

@@ -1,14 +1,15 @@
 //! The tree of one placed thing: all meshes that share a transform, in their own space.
 
 use super::opacity;
-use super::triangle::TreeTriangle;
-use super::wide::WideTree;
+use super::triangle::{TreeTriangle, TrianglePack};
+use super::wide::{MOST_IN_LEAF, WideTree};
 use crate::scene::Scene;
 use glam::{Affine3A, Vec3};
 use obvhs::aabb::Aabb;
 use obvhs::bvh2::reinsertion::ReinsertionOptimizer;
 use obvhs::cwbvh::bvh2_to_cwbvh::bvh2_to_cwbvh;
 use obvhs::ploc::{PlocBuilder, PlocSearchDistance, SortPrecision};
+use std::ops::Range;
 
 /// Larger coordinates would overflow when squared; no such triangle is met.
 const MAX_COORDINATE: f32 = 1e15;
@@ -21,11 +22,12 @@ const PADDING: f32 = 1.0 / (1 << 18) as f32;
 /// A ray that starts further away than this many sizes of a tree's bounds is brought nearer.
 const FAR: f32 = 4.0;
 
-/// A tree over triangles, which lie in its order.
+/// A tree over triangles.
 #[derive(Default)]
 pub(super) struct Tree {
     pub wide: WideTree,
-    pub triangles: Vec<TreeTriangle>,
+    /// Those of each leaf.
+    pub leaves: Vec<TrianglePack>,
     /// What the triangles span; minimum above maximum where there are none.
     pub bounds: Bounds,
 }
@@ -129,32 +131,45 @@ impl Tree {
                 let corners = triangle.map(|i| part.positions[i as usize]);
                 if has_area(corners) {
                     corners.into_iter().for_each(|p| bounds.include(p));
-                    triangles.push(TreeTriangle::new(corners, primitive as u32, number as u32, flags));
+                    let (primitive, part) = (primitive as u32, number as u32);
+                    triangles.push(TreeTriangle { corners, primitive, part, flags });
                 }
             }
         }
         let boxes = triangles.iter().map(|t| {
             let mut bounds = Bounds::default();
-            t.corners().into_iter().for_each(|p| bounds.include(p));
+            t.corners.into_iter().for_each(|p| bounds.include(p));
             bounds
         });
-        let (wide, order) = build(&boxes.collect::<Vec<_>>(), bounds.reach());
-        let triangles = order.iter().map(|&i| triangles[i as usize]).collect();
-        Self { wide, triangles, bounds }
+        let Built { tree: wide, order, leaves } = build(&boxes.collect::<Vec<_>>(), bounds.reach());
+        let pack = |leaf: &Range<usize>| {
+            TrianglePack::new(order[leaf.clone()].iter().map(|&i| &triangles[i as usize]))
+        };
+        Self { wide, leaves: leaves.iter().map(pack).collect(), bounds }
     }
 
     pub fn memory_bytes(&self) -> usize {
-        size_of_val(self.triangles.as_slice()) + self.wide.memory_bytes()
+        size_of_val(self.leaves.as_slice()) + self.wide.memory_bytes()
     }
 }
 
-/// An eight-wide tree over boxes that lie within `reach` of the origin, and their order in it.
+/// A tree over boxes.
+#[derive(Default)]
+pub(super) struct Built {
+    pub tree: WideTree,
+    /// The boxes' numbers in the tree's order.
+    pub order: Vec<u32>,
+    /// For each leaf, by number: where in the order its boxes are.
+    pub leaves: Vec<Range<usize>>,
+}
+
+/// An eight-wide tree over boxes that lie within `reach` of the origin.
 ///
 /// The parameters are `BvhBuildParams::medium_build`'s, which build a quarter of a million triangles in a tenth of a
 /// second. Slower presets, splitting long triangles included, traced no faster than the noise of the measurement.
-pub(super) fn build(bounds: &[Bounds], reach: f32) -> (WideTree, Vec<u32>) {
+pub(super) fn build(bounds: &[Bounds], reach: f32) -> Built {
     if bounds.is_empty() {
-        return (WideTree::default(), Vec::new());
+        return Built::default();
     }
     // A horizon far away should not fatten what is near the middle.
     let padded: Vec<Bounds> = bounds.iter().map(|b| b.padded(b.reach().max(reach / 64.0))).collect();
@@ -163,10 +178,11 @@ pub(super) fn build(bounds: &[Bounds], reach: f32) -> (WideTree, Vec<u32>) {
     let mut builder = PlocBuilder::with_capacity(boxes.len());
     let mut bvh2 = builder.build(PlocSearchDistance::Medium, &boxes, indices, SortPrecision::U64, 3);
     ReinsertionOptimizer::default().run(&mut bvh2, 0.05, None);
-    let bvh = bvh2_to_cwbvh(&bvh2, 3, true, false);
+    let bvh = bvh2_to_cwbvh(&bvh2, MOST_IN_LEAF as u32, true, false);
     let order = bvh.primitive_indices.clone();
     let ordered: Vec<Bounds> = order.iter().map(|&i| padded[i as usize]).collect();
-    (WideTree::new(&bvh, &ordered), order)
+    let (tree, leaves) = WideTree::new(&bvh, &ordered);
+    Built { tree, order, leaves }
 }
 
 fn has_area([a, b, c]: [Vec3; 3]) -> bool {

@@ -4,15 +4,28 @@
 //! frame, where an edge's function is computed from its two vertices alone; two triangles that share the edge
 //! get exactly opposite values, so no ray slips between them. Zero counts as inside for both.
 
-use glam::Vec3;
+use glam::{Vec3, Vec4};
 
-/// A triangle in the order of its tree: 48 bytes, corners and what a hit needs to know.
+/// A triangle, and what a hit on it needs to know.
 #[derive(Debug, Clone, Copy)]
-#[repr(C)]
 pub(super) struct TreeTriangle {
-    /// Corners in x, y, z. In the fourth place, as bits: the primitive's number in its mesh, the number of the mesh
-    /// in the tree, and the [`super::opacity`] flags.
-    corners: [[f32; 4]; 3],
+    pub corners: [Vec3; 3],
+    /// Its number in its mesh.
+    pub primitive: u32,
+    /// The number of the mesh in the tree.
+    pub part: u32,
+    /// Those of [`super::opacity`].
+    pub flags: u32,
+}
+
+/// Up to four triangles, which are tested at once.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct TrianglePack {
+    /// For each corner and axis: the coordinates of all. NaN where there is none, so that it is never met.
+    corners: [[Vec4; 3]; 3],
+    primitives: [u32; 4],
+    parts: [u32; 4],
+    flags: [u32; 4],
 }
 
 /// Where a ray meets a triangle.
@@ -27,37 +40,73 @@ pub(super) struct TriangleHit {
     pub front: bool,
 }
 
-impl TreeTriangle {
-    pub fn new(corners: [Vec3; 3], primitive: u32, part: u32, flags: u32) -> Self {
-        let with = |p: Vec3, bits: u32| [p.x, p.y, p.z, f32::from_bits(bits)];
-        let [a, b, c] = corners;
-        Self { corners: [with(a, primitive), with(b, part), with(c, flags)] }
+/// Where a ray meets the triangles of a pack, and a bit for each that it meets.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct PackHits {
+    mask: u32,
+    t: Vec4,
+    u: Vec4,
+    v: Vec4,
+    front: u32,
+}
+
+impl TrianglePack {
+    /// Of one to four triangles.
+    pub fn new<'a>(triangles: impl Iterator<Item = &'a TreeTriangle>) -> Self {
+        let (mut corners, mut numbers) = ([[Vec4::NAN; 3]; 3], [[0; 4]; 3]);
+        for (lane, triangle) in triangles.take(4).enumerate() {
+            for (axes, corner) in corners.iter_mut().zip(triangle.corners) {
+                axes.iter_mut().zip(corner.to_array()).for_each(|(axis, value)| axis[lane] = value);
+            }
+            let of = [triangle.primitive, triangle.part, triangle.flags];
+            numbers.iter_mut().zip(of).for_each(|(numbers, number)| numbers[lane] = number);
+        }
+        let [primitives, parts, flags] = numbers;
+        Self { corners, primitives, parts, flags }
     }
 
-    pub fn primitive(&self) -> u32 {
-        self.corners[0][3].to_bits()
+    pub fn primitive(&self, lane: usize) -> u32 {
+        self.primitives[lane]
     }
 
-    pub fn part(&self) -> u32 {
-        self.corners[1][3].to_bits()
+    pub fn part(&self, lane: usize) -> u32 {
+        self.parts[lane]
     }
 
-    pub fn flags(&self) -> u32 {
-        self.corners[2][3].to_bits()
+    pub fn flags(&self, lane: usize) -> u32 {
+        self.flags[lane]
     }
+}
 
-    pub fn corners(&self) -> [Vec3; 3] {
-        self.corners.map(|[x, y, z, _]| Vec3::new(x, y, z))
+impl Iterator for PackHits {
+    type Item = (usize, TriangleHit);
+
+    /// The next triangle that is met, by its place in the pack.
+    #[inline(always)]
+    fn next(&mut self) -> Option<Self::Item> {
+        if self.mask == 0 {
+            return None;
+        }
+        let lane = self.mask.trailing_zeros() as usize & 3;
+        self.mask &= self.mask - 1;
+        let hit = TriangleHit {
+            t: self.t[lane],
+            u: self.u[lane],
+            v: self.v[lane],
+            front: self.front >> lane & 1 == 1,
+        };
+        Some((lane, hit))
     }
 }
 
 /// A ray prepared for many triangles: its origin, and the shear that turns its direction into +Z.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct ShearedRay {
-    origin: [f32; 4],
     /// Axes: the third is the direction's longest, the others keep the triangle's winding.
     axes: [usize; 3],
-    shear: [f32; 3],
+    /// In the order of the axes.
+    origin: [Vec4; 3],
+    shear: [Vec4; 3],
 }
 
 impl ShearedRay {
@@ -69,45 +118,42 @@ impl ShearedRay {
             std::mem::swap(&mut first, &mut second);
         }
         let inverse = 1.0 / d[longest];
+        let axes = [first, second, longest];
         Self {
-            origin: origin.extend(0.0).to_array(),
-            axes: [first, second, longest],
-            shear: [d[first] * inverse, d[second] * inverse, inverse],
+            axes,
+            origin: axes.map(|axis| Vec4::splat(origin[axis])),
+            shear: [d[first] * inverse, d[second] * inverse, inverse].map(Vec4::splat),
         }
     }
 
-    /// The hit with `t_min <= t <= t_max`, where there is one. False comparisons with NaN make a miss of every
-    /// degenerate case.
+    /// The hits with `t_min <= t <= t_max`. False comparisons with NaN make a miss of every degenerate case.
     #[inline(always)]
-    pub fn intersect(&self, triangle: &TreeTriangle, t_min: f32, t_max: f32) -> Option<TriangleHit> {
-        // The mask proves to the compiler that the indices are in range.
-        let [kx, ky, kz] = self.axes.map(|k| k & 3);
+    pub fn intersect(&self, pack: &TrianglePack, t_min: f32, t_max: f32) -> PackHits {
+        let [kx, ky, kz] = self.axes;
+        let [ox, oy, oz] = self.origin;
         let [sx, sy, sz] = self.shear;
-        let shear = |corner: &[f32; 4]| {
-            let z = corner[kz] - self.origin[kz];
-            [corner[kx] - self.origin[kx] - sx * z, corner[ky] - self.origin[ky] - sy * z, z]
+        let shear = |corner: &[Vec4; 3]| {
+            let z = corner[kz] - oz;
+            [corner[kx] - ox - sx * z, corner[ky] - oy - sy * z, z]
         };
-        let [a, b, c] = &triangle.corners;
+        let [a, b, c] = &pack.corners;
         let (a, b, c) = (shear(a), shear(b), shear(c));
         let wa = c[0] * b[1] - c[1] * b[0];
         let wb = a[0] * c[1] - a[1] * c[0];
         let wc = b[0] * a[1] - b[1] * a[0];
-        let inside = (wa >= 0.0 && wb >= 0.0 && wc >= 0.0) || (wa <= 0.0 && wb <= 0.0 && wc <= 0.0);
-        if !inside {
-            return None;
-        }
+        let zero = Vec4::ZERO;
+        let inside = (wa.cmpge(zero) & wb.cmpge(zero) & wc.cmpge(zero))
+            | (wa.cmple(zero) & wb.cmple(zero) & wc.cmple(zero));
         let sum = wa + wb + wc;
-        if sum == 0.0 {
-            return None;
+        let inside = inside & sum.cmpne(zero);
+        if !inside.any() {
+            return PackHits { mask: 0, t: zero, u: zero, v: zero, front: 0 };
         }
-        let inverse = 1.0 / sum;
+        let inverse = Vec4::ONE / sum;
         let t = (wa * a[2] + wb * b[2] + wc * c[2]) * inverse * sz;
-        (t >= t_min && t <= t_max).then_some(TriangleHit {
-            t,
-            u: wb * inverse,
-            v: wc * inverse,
-            front: sum > 0.0,
-        })
+        let met = inside & t.cmpge(Vec4::splat(t_min)) & t.cmple(Vec4::splat(t_max));
+        let (u, v) = (wb * inverse, wc * inverse);
+        PackHits { mask: met.bitmask(), t, u, v, front: sum.cmpgt(zero).bitmask() }
     }
 }
 
@@ -117,17 +163,37 @@ mod tests {
 
     const CORNERS: [Vec3; 3] = [Vec3::ZERO, Vec3::X, Vec3::Y];
 
+    /// What the ray meets of one triangle.
+    fn meet(ray: &ShearedRay, corners: [Vec3; 3], t_min: f32, t_max: f32) -> Option<TriangleHit> {
+        let triangle = TreeTriangle { corners, primitive: 0, part: 0, flags: 0 };
+        ray.intersect(&TrianglePack::new([triangle].iter()), t_min, t_max).next().map(|(_, hit)| hit)
+    }
+
     #[test]
     fn a_hit_has_its_barycentrics_and_side() {
-        let triangle = TreeTriangle::new(CORNERS, 7, 8, 9);
-        assert_eq!((triangle.primitive(), triangle.part(), triangle.flags()), (7, 8, 9));
         let down = ShearedRay::new(Vec3::new(0.25, 0.5, 3.0), Vec3::NEG_Z);
-        let hit = down.intersect(&triangle, 0.0, 10.0).unwrap();
+        let hit = meet(&down, CORNERS, 0.0, 10.0).unwrap();
         assert_eq!((hit.t, hit.u, hit.v, hit.front), (3.0, 0.25, 0.5, true));
         let up = ShearedRay::new(Vec3::new(0.25, 0.5, -3.0), Vec3::Z);
-        let hit = up.intersect(&triangle, 0.0, 10.0).unwrap();
+        let hit = meet(&up, CORNERS, 0.0, 10.0).unwrap();
         assert_eq!((hit.t, hit.u, hit.v, hit.front), (3.0, 0.25, 0.5, false));
-        assert!(up.intersect(&triangle, 0.0, 2.9).is_none() && up.intersect(&triangle, 3.1, 9.0).is_none());
+        assert!(meet(&up, CORNERS, 0.0, 2.9).is_none() && meet(&up, CORNERS, 3.1, 9.0).is_none());
+    }
+
+    #[test]
+    fn a_pack_meets_each_of_its_triangles_and_no_other() {
+        let at = |z: f32, part: u32| TreeTriangle {
+            corners: CORNERS.map(|c| c + Vec3::Z * z),
+            primitive: 10 + part,
+            part,
+            flags: 20 + part,
+        };
+        let aside = TreeTriangle { corners: CORNERS.map(|c| c + Vec3::X * 5.0), ..at(0.0, 1) };
+        let pack = TrianglePack::new([at(0.0, 0), aside, at(-1.0, 2)].iter());
+        let ray = ShearedRay::new(Vec3::new(0.25, 0.5, 3.0), Vec3::NEG_Z);
+        let hits: Vec<_> = ray.intersect(&pack, 0.0, 10.0).map(|(lane, hit)| (lane, hit.t)).collect();
+        assert_eq!(hits, [(0, 3.0), (2, 4.0)]);
+        assert_eq!((pack.primitive(2), pack.part(2), pack.flags(2)), (12, 2, 22));
     }
 
     #[test]
@@ -135,9 +201,9 @@ mod tests {
         let ray = ShearedRay::new(Vec3::new(0.0, 0.0, 3.0), Vec3::NEG_Z);
         for corners in [[Vec3::ZERO; 3], [Vec3::ZERO, Vec3::X, Vec3::X * 2.0], [Vec3::NAN, Vec3::X, Vec3::Y]]
         {
-            assert!(ray.intersect(&TreeTriangle::new(corners, 0, 0, 0), 0.0, 10.0).is_none());
+            assert!(meet(&ray, corners, 0.0, 10.0).is_none());
         }
         let nowhere = ShearedRay::new(Vec3::new(0.1, 0.1, 3.0), Vec3::ZERO);
-        assert!(nowhere.intersect(&TreeTriangle::new(CORNERS, 0, 0, 0), 0.0, 10.0).is_none());
+        assert!(meet(&nowhere, CORNERS, 0.0, 10.0).is_none());
     }
 }

@@ -8,11 +8,13 @@
 use super::tree::Bounds;
 use glam::{Vec3, Vec4};
 use obvhs::cwbvh::CwBvh;
+use std::ops::Range;
 
-/// Marks a child as a leaf; two bits below are its number of primitives, the rest the first of them.
+/// Primitives in a leaf, at most: what `obvhs`'s nodes have room for.
+pub(super) const MOST_IN_LEAF: usize = 3;
+
+/// Marks a child as a leaf; the other bits are its number.
 const LEAF: u32 = 1 << 31;
-const COUNT_SHIFT: u32 = 29;
-const FIRST_MASK: u32 = (1 << COUNT_SHIFT) - 1;
 
 /// Boxes' far sides are this much further, for the rounding of their distance (Ize: Robust BVH Ray Traversal, JCGT 2013).
 const FAR_SIDE: f32 = 1.0 + 4.0 * f32::EPSILON;
@@ -79,14 +81,16 @@ impl SlabRay {
 }
 
 impl WideTree {
-    /// The tree with the structure of `bvh`, whose primitives have `bounds` in the tree's order.
-    pub fn new(bvh: &CwBvh, bounds: &[Bounds]) -> Self {
+    /// The tree with the structure of `bvh`, whose primitives have `bounds` in the tree's order; and for each of its leaves,
+    /// by number, which of them are in it: one to [`MOST_IN_LEAF`].
+    pub fn new(bvh: &CwBvh, bounds: &[Bounds]) -> (Self, Vec<Range<usize>>) {
         let mut tree = Self { nodes: Vec::with_capacity(bvh.nodes.len()), pending: 0 };
+        let mut leaves = Vec::new();
         if !bvh.nodes.is_empty() && !bounds.is_empty() {
-            let (_, depth) = tree.add(bvh, bounds, 0);
+            let (_, depth) = tree.add(bvh, bounds, 0, &mut leaves);
             tree.pending = 7 * depth + 1;
         }
-        tree
+        (tree, leaves)
     }
 
     /// Entries that a traversal needs in the slice that it is given.
@@ -99,7 +103,13 @@ impl WideTree {
     }
 
     /// Adds a node and all below it; returns its bounds and depth.
-    fn add(&mut self, bvh: &CwBvh, bounds: &[Bounds], index: usize) -> (Bounds, usize) {
+    fn add(
+        &mut self,
+        bvh: &CwBvh,
+        bounds: &[Bounds],
+        index: usize,
+        leaves: &mut Vec<Range<usize>>,
+    ) -> (Bounds, usize) {
         let source = &bvh.nodes[index];
         let number = self.nodes.len();
         let (mut boxes, mut children) = ([Bounds::default(); 8], [LEAF; 8]);
@@ -111,11 +121,13 @@ impl WideTree {
             }
             if source.is_leaf(slot) {
                 let (first, count) = source.child_primitives(slot);
-                children[slot] = LEAF | count << COUNT_SHIFT | first;
-                bounds[first as usize..(first + count) as usize].iter().for_each(|b| boxes[slot].join(b));
+                let primitives = first as usize..(first + count) as usize;
+                children[slot] = LEAF | leaves.len() as u32;
+                bounds[primitives.clone()].iter().for_each(|b| boxes[slot].join(b));
+                leaves.push(primitives);
             } else {
                 children[slot] = self.nodes.len() as u32;
-                let below = self.add(bvh, bounds, source.child_node_index(slot) as usize);
+                let below = self.add(bvh, bounds, source.child_node_index(slot) as usize, leaves);
                 (boxes[slot], depth) = (below.0, depth.max(below.1));
             }
         }
@@ -130,9 +142,9 @@ impl WideTree {
         (all, depth + 1)
     }
 
-    /// Visits primitives along the ray, about the nearest first, as long as their boxes begin before `t_max`.
+    /// Visits leaves along the ray, about the nearest first, as long as their boxes begin before `t_max`.
     ///
-    /// `visit` is given a primitive, the current `t_max`, and the part of `pending` that is free; it returns the new
+    /// `visit` is given a leaf's number, the current `t_max`, and the part of `pending` that is free; it returns the new
     /// `t_max`. `pending` must have room for [`WideTree::pending`] entries.
     #[inline]
     pub fn nearest(
@@ -149,10 +161,7 @@ impl WideTree {
         let mut child = 0;
         loop {
             if child & LEAF != 0 {
-                let first = (child & FIRST_MASK) as usize;
-                for primitive in first..first + (child >> COUNT_SHIFT & 3) as usize {
-                    t_max = visit(primitive, t_max, &mut pending[waiting..]);
-                }
+                t_max = visit((child & !LEAF) as usize, t_max, &mut pending[waiting..]);
             } else {
                 let node = &self.nodes[child as usize];
                 let (enters, mut mask) = ray.meet(node, t_max);
@@ -186,8 +195,7 @@ impl WideTree {
         }
     }
 
-    /// True if `blocks` is true for any primitive whose box the ray meets before `t_max`. Otherwise as
-    /// [`WideTree::nearest`].
+    /// True if `blocks` is true for any leaf whose box the ray meets before `t_max`. Otherwise as [`WideTree::nearest`].
     #[inline]
     pub fn any(
         &self,
@@ -213,11 +221,8 @@ impl WideTree {
                     waiting += 1;
                     continue;
                 }
-                let first = (child & FIRST_MASK) as usize;
-                for primitive in first..first + (child >> COUNT_SHIFT & 3) as usize {
-                    if blocks(primitive, &mut pending[waiting..]) {
-                        return true;
-                    }
+                if blocks((child & !LEAF) as usize, &mut pending[waiting..]) {
+                    return true;
                 }
             }
         }
