@@ -32,6 +32,13 @@ pub(super) fn refract(incident: Vec3, normal: Vec3, eta: f32) -> Option<Vec3> {
     (sin2 < 1.0).then(|| incident / eta + normal * (cos / eta - (1.0 - sin2).sqrt()))
 }
 
+/// GGX's density of half vectors with cosine `nh` to the normal, 1/sr; `a2` is alpha squared.
+#[inline]
+pub(super) fn density(nh: f32, a2: f32) -> f32 {
+    let d = nh * nh * (a2 - 1.0) + 1.0;
+    a2 / (PI * d * d)
+}
+
 /// BRDF without its Fresnel term, and the cosine between view and half vector that the term needs.
 /// `None` where the lobe has less than `min` of density.
 #[inline]
@@ -40,8 +47,7 @@ pub(super) fn lobe(normal: Vec3, view: Vec3, light: Vec3, alpha: f32, min: f32) 
     let (nh, nl) = (normal.dot(half).clamp(0.0, 1.0), normal.dot(light).clamp(0.0, 1.0));
     let nv = normal.dot(view).abs().max(1e-4);
     let a2 = alpha * alpha;
-    let d = nh * nh * (a2 - 1.0) + 1.0;
-    let density = a2 / (PI * d * d);
+    let density = density(nh, a2);
     if density < min {
         return None;
     }

@@ -243,6 +243,21 @@ impl Emitter {
         }
     }
 
+    /// Length of the difference between the unit directions to its middle and to any other part, at most.
+    pub fn chord(&self, point: Vec3) -> f32 {
+        match &self.shape {
+            Shape::Directional { sin, .. } => (2.0 * height(*sin)).sqrt(),
+            Shape::Sphere { position, radius, .. } => {
+                (2.0 * height((radius / position.distance(point)).min(1.0))).sqrt()
+            }
+            // As of a sphere around it.
+            Shape::Panel(panel) => {
+                let sin = (panel.right.length() + panel.up.length()) / panel.middle.distance(point);
+                if sin < 1.0 { (2.0 * height(sin)).sqrt() } else { 2.0 }
+            }
+        }
+    }
+
     /// The inverse square and the range's window. A sphere is no brighter inside than on its surface.
     fn falloff(&self, distance: f32, radius: f32) -> f32 {
         1.0 / distance.max(MIN_DISTANCE).max(radius).powi(2) * self.window(distance)

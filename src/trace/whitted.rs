@@ -1,6 +1,6 @@
 //! What leaves a surface towards the eye, and the rays that have to be followed to know it.
 
-use super::ggx::{environment_share, lobe, refract};
+use super::ggx::{density, environment_share, lobe, refract};
 use super::interaction::{Beam, SurfaceInteraction};
 use super::light::{Emitter, GRID, Unshadowed};
 use super::point::Side;
@@ -109,11 +109,37 @@ impl Surface {
             return mirrored(alpha, unshadowed.to_light);
         }
         // A light is cut in parts narrower than the lobe, as far as a few will do, and the lobe is widened by their size.
-        let spread = light.solid_angle(it.point.position) / TAU;
+        let position = it.point.position;
+        let spread = light.solid_angle(position) / TAU;
         let rows = (4.0 * spread.sqrt() / alpha).ceil().clamp(1.0, GRID as f32);
         let alpha = (alpha * alpha + spread / (rows * rows)).sqrt();
-        light.mean(it.point.position, it.normal, rows as u32, |to_light| mirrored(alpha, to_light))
+        let middle = unshadowed.to_light;
+        if rows == 1.0 {
+            return if it.normal.dot(middle) > 0.0 { mirrored(alpha, middle) } else { Vec3::ZERO };
+        }
+        if !may_mirror(it.normal, toward, middle, light.chord(position), alpha) {
+            return Vec3::ZERO;
+        }
+        light.mean(position, it.normal, rows as u32, |to_light| mirrored(alpha, to_light))
     }
+}
+
+/// False if no direction that is within `chord` of `light`, all of them unit vectors, has a lobe that counts.
+fn may_mirror(normal: Vec3, view: Vec3, light: Vec3, chord: f32, alpha: f32) -> bool {
+    let half = view + light;
+    let length = half.length();
+    // The half vector moves by no more than the light does: so far at most does it turn.
+    let sin = chord / length;
+    if sin.is_nan() || sin >= 1.0 {
+        return true;
+    }
+    let turn = (sin, (1.0 - sin * sin).sqrt());
+    let cos = normal.dot(half) / length;
+    if cos >= turn.1 {
+        return true;
+    }
+    let nearest = cos * turn.1 + (1.0 - cos * cos).max(0.0).sqrt() * turn.0;
+    density(nearest, alpha * alpha) >= MIN_LOBE
 }
 
 impl Tracer<'_> {
