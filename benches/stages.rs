@@ -17,7 +17,7 @@ use buzz::output::{Compression, FileOptions, MemorySink, SettingsHasher};
 use buzz::plan::{Plan, PlannedFrame, Segment};
 use buzz::scene::{Scene, View};
 use buzz::sequence::{FrameSink, Settings, Unwatched, render_sequence};
-use buzz::trace::{TraceOptions, Tracer};
+use buzz::trace::{Eye, TraceOptions, Tracer};
 use criterion::{Criterion, criterion_group, criterion_main};
 use glam::DVec3;
 use std::path::Path;
@@ -27,11 +27,11 @@ const HEIGHT: u32 = 720;
 /// A frame in the middle of the walk, and the step that is inferred.
 const FRAME: i64 = 20;
 
-struct Caster<'a>(&'a Tracer<'a>, &'a View);
+struct Caster<'a>(&'a Tracer<'a>, Eye);
 
 impl CastRays for Caster<'_> {
     fn cast(&self, x: usize, y: usize, lit: &mut [u32], counts: &mut RayCounts) -> SurfaceSample {
-        self.0.cast(self.1, x as f64 + 0.5, y as f64 + 0.5, lit, counts)
+        self.0.cast(&self.1, x as f64 + 0.5, y as f64 + 0.5, lit, counts)
     }
 }
 
@@ -52,7 +52,7 @@ fn stages(c: &mut Criterion) {
     let (old_view, new_view) = (Projector::new(&from, origin), Projector::new(&to, origin));
     let fresh = || BuzzBuffer::new(WIDTH as usize, HEIGHT as usize, tracer.lit_words());
     let (mut old, mut new) = (fresh(), fresh());
-    old.cast_unknown(&old_view, &Caster(&tracer, &from));
+    old.cast_unknown(&old_view, &Caster(&tracer, tracer.eye(&from)));
     let pixels = old.object.len();
 
     let mut group = c.benchmark_group("stages");
@@ -61,7 +61,7 @@ fn stages(c: &mut Criterion) {
         let mut buffer = fresh();
         b.iter(|| {
             buffer.forget(PixelClass::Traced);
-            buffer.cast_unknown(&old_view, &Caster(&tracer, &from))
+            buffer.cast_unknown(&old_view, &Caster(&tracer, tracer.eye(&from)))
         });
     });
     let (mut landings, mut marks) = (Landings::default(), Marks::default());
@@ -74,7 +74,7 @@ fn stages(c: &mut Criterion) {
     });
     group.bench_function("obscured", |b| b.iter(|| obscured(&old, &old_view, &new_view, &landings, &marks)));
     group.bench_function("gather", |b| b.iter(|| gather(&old, &landings, &marks, &mut new)));
-    new.cast_unknown(&new_view, &Caster(&tracer, &to));
+    new.cast_unknown(&new_view, &Caster(&tracer, tracer.eye(&to)));
     group.bench_function("clean-up", |b| {
         b.iter(|| {
             creeping(&new, &landings, Along::Columns, &marks);
@@ -84,7 +84,13 @@ fn stages(c: &mut Criterion) {
     group.bench_function("infer", |b| {
         let mut inference = Inference::default();
         b.iter(|| {
-            inference.infer(Move::Camera, (&old, &from), (&mut new, &to), origin, &Caster(&tracer, &to))
+            inference.infer(
+                Move::Camera,
+                (&old, &from),
+                (&mut new, &to),
+                origin,
+                &Caster(&tracer, tracer.eye(&to)),
+            )
         });
     });
     let mut sink = MemorySink::default();

@@ -7,7 +7,7 @@ use super::triangle::{ShearedRay, TreeTriangle, TriangleHit, TrianglePack};
 use super::wide::{Pending, SlabRay};
 use super::{Accel, Placed, PlacedTree};
 use crate::frame::SurfaceRef;
-use crate::scene::{Mesh, Scene, View};
+use crate::scene::{Mesh, Scene};
 use glam::Vec3;
 
 /// A ray in render space, relative to [`Accel::origin`], and the part of it that counts.
@@ -52,18 +52,6 @@ struct Nearest {
 }
 
 impl Accel {
-    /// The ray of `view` through raster position (x, y), from its near plane to its far plane; its parameter is planar
-    /// depth.
-    pub fn camera_ray(&self, view: &View, x: f64, y: f64) -> Ray {
-        let ray = view.ray(x, y);
-        Ray {
-            origin: (ray.origin - self.origin).as_vec3(),
-            direction: ray.direction.as_vec3(),
-            t_min: view.lens.near.max(0.0) as f32,
-            t_max: view.lens.far as f32,
-        }
-    }
-
     /// The nearest surface on the ray. Holes cut by alpha are not met. Where two surfaces are equally near, the one with
     /// the lower numbers is met, whatever the trees look like.
     pub fn intersect(&self, scene: &Scene, ray: &Ray, sides: Sides) -> Option<RayHit> {

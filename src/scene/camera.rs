@@ -167,8 +167,13 @@ impl View {
 
     /// The ray through raster position (x, y).
     pub fn ray(&self, x: f64, y: f64) -> CameraRay {
+        self.ray_within(self.half_extent(), x, y)
+    }
+
+    /// [`View::ray`] for a half extent that is known already.
+    pub(crate) fn ray_within(&self, half_extent: DVec2, x: f64, y: f64) -> CameraRay {
         let ndc = DVec2::new(2.0 * x / f64::from(self.width) - 1.0, 1.0 - 2.0 * y / f64::from(self.height));
-        let on_plane = (ndc + self.lens.shift) * self.half_extent();
+        let on_plane = (ndc + self.lens.shift) * half_extent;
         let across = self.right * on_plane.x + self.up * on_plane.y;
         if self.is_perspective() {
             CameraRay { origin: self.eye, direction: self.forward + across }

@@ -292,7 +292,14 @@ impl Emitter<'_> {
         motion: Option<&'a SceneMotion<'a>>,
     ) -> Caster<'a> {
         let jitter = self.settings.jitter.map(|seed| mix(seed ^ shot.frame as u64));
-        Caster { tracer, view: &shot.view, observer: &*self.observer, jitter, motion }
+        Caster {
+            tracer,
+            view: &shot.view,
+            eye: tracer.eye(&shot.view),
+            observer: &*self.observer,
+            jitter,
+            motion,
+        }
     }
 
     /// Casts a ray through every pixel.
@@ -363,6 +370,7 @@ impl Emitter<'_> {
                 scene: self.scene,
                 settings: self.settings,
                 tracer,
+                eye: tracer.eye(&shot.view),
                 observer: &*self.observer,
                 origin: self.origin,
                 shot,

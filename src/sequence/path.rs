@@ -73,11 +73,12 @@ fn probe(tracer: &Tracer<'_>, origin: DVec3, view: &View, neighbours: &[View; 2]
         true => sample.position.as_dvec3(),
         false => sample.position.as_dvec3() + origin,
     };
+    let (eye, neighbours) = (tracer.eye(view), neighbours.map(|n| tracer.eye(&n)));
     let look = |&(x, y): &(f64, f64)| {
         let (mut lit, mut rays) = (vec![0; tracer.lit_words()], RayCounts::default());
-        let sample = tracer.cast(view, x, y, &mut lit, &mut rays);
+        let sample = tracer.cast(&eye, x, y, &mut lit, &mut rays);
         let shadow_rays = rays.shadow + rays.ambient;
-        let mut hit = |dx: f64, dy: f64| tracer.hit(view, x + dx, y + dy, &mut rays);
+        let mut hit = |dx: f64, dy: f64| tracer.hit(&eye, x + dx, y + dy, &mut rays);
         let corners = [(-1.0, -1.0), (1.0, -1.0), (-1.0, 1.0), (1.0, 1.0)];
         let is_edge = corners.into_iter().any(|(dx, dy)| !is_one_surface(&sample, &hit(dx, dy), &projector));
         let beside = [hit(1.0, 0.0), hit(0.0, 1.0)].map(|s| position(&s));

@@ -5,7 +5,7 @@ use crate::accel::Displaced;
 use crate::frame::{Aov, Frame, FrameKind, FrameStats, Matte, RayCounts, SurfaceSample, Window};
 use crate::infer::BuzzBuffer;
 use crate::scene::{Scene, View};
-use crate::trace::Tracer;
+use crate::trace::{Eye, Tracer};
 use glam::{DVec3, DVec4, Vec3};
 use rayon::prelude::*;
 use std::sync::Arc;
@@ -15,6 +15,8 @@ pub(super) struct Resolver<'a> {
     pub scene: &'a Scene,
     pub settings: &'a Settings,
     pub tracer: &'a Tracer<'a>,
+    /// Of the shot's view.
+    pub eye: Eye,
     /// Asked at each row whether to go on.
     pub observer: &'a dyn Observer,
     /// Sample positions are relative to this.
@@ -66,7 +68,7 @@ impl Resolver<'_> {
         fill(&mut frame.class, size(Aov::Class), |i| buffer.class[i] as u8);
         fill(&mut frame.object, size(Aov::Object), |i| buffer.object[i]);
         fill(&mut frame.normal, size(Aov::Normal), |i| {
-            self.on_surface(buffer, i, |s| self.tracer.shading_normal(&self.shot.view, s))
+            self.on_surface(buffer, i, |s| self.tracer.shading_normal(&self.eye, s))
         });
         fill(&mut frame.position, size(Aov::Position), |i| {
             self.on_surface(buffer, i, |s| (s.position.as_dvec3() + self.origin).as_vec3())
@@ -84,7 +86,7 @@ impl Resolver<'_> {
             name.clone_from(&self.scene.lights[number].name);
             fill(layer, pixels, |i| {
                 self.on_surface(buffer, i, |s| {
-                    self.tracer.light_diffuse(&self.shot.view, s, buffer.lit(i), number) * gain
+                    self.tracer.light_diffuse(&self.eye, s, buffer.lit(i), number) * gain
                 })
             });
         }
@@ -138,7 +140,7 @@ impl Resolver<'_> {
     }
 
     fn pixel(&self, sample: &SurfaceSample, lit: &[u32], counts: &mut RayCounts) -> Pixel {
-        let radiance = self.tracer.shade(&self.shot.view, sample, lit, counts);
+        let radiance = self.tracer.shade(&self.eye, sample, lit, counts);
         let gain = self.settings.exposure.exp2();
         let (diffuse, specular, emission) =
             (radiance.diffuse * gain, radiance.specular * gain, radiance.emission * gain);
@@ -228,10 +230,10 @@ pub(super) fn count_hidden(
     view: &View,
     buffer: &BuzzBuffer,
 ) -> u64 {
-    let pixels = (0..buffer.class.len()).into_par_iter();
+    let (eye, pixels) = (tracer.eye(view), (0..buffer.class.len()).into_par_iter());
     let hidden = |&i: &usize| {
         let asked = buffer.class[i].is_reused() && observer.stop_requested().is_none();
-        asked && tracer.is_hidden(view, &buffer.sample(i))
+        asked && tracer.is_hidden(&eye, &buffer.sample(i))
     };
     pixels.filter(hidden).count() as u64
 }

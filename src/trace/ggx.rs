@@ -32,10 +32,10 @@ pub(super) fn refract(incident: Vec3, normal: Vec3, eta: f32) -> Option<Vec3> {
     (sin2 < 1.0).then(|| incident / eta + normal * (cos / eta - (1.0 - sin2).sqrt()))
 }
 
-/// GGX's density of half vectors with cosine `nh` to the normal, 1/sr; `a2` is alpha squared.
+/// GGX's density of half vectors, 1/sr; `nh2` is the square of their cosine to the normal, `a2` that of alpha.
 #[inline]
-pub(super) fn density(nh: f32, a2: f32) -> f32 {
-    let d = nh * nh * (a2 - 1.0) + 1.0;
+pub(super) fn density(nh2: f32, a2: f32) -> f32 {
+    let d = nh2 * (a2 - 1.0) + 1.0;
     a2 / (PI * d * d)
 }
 
@@ -43,14 +43,17 @@ pub(super) fn density(nh: f32, a2: f32) -> f32 {
 /// `None` where the lobe has less than `min` of density.
 #[inline]
 pub(super) fn lobe(normal: Vec3, view: Vec3, light: Vec3, alpha: f32, min: f32) -> Option<(f32, f32)> {
-    let half = (view + light).normalize_or_zero();
-    let (nh, nl) = (normal.dot(half).clamp(0.0, 1.0), normal.dot(light).clamp(0.0, 1.0));
-    let nv = normal.dot(view).abs().max(1e-4);
+    let half = view + light;
+    let (square, along) = (half.length_squared(), normal.dot(half).max(0.0));
     let a2 = alpha * alpha;
-    let density = density(nh, a2);
-    if density < min {
+    let density = density((along * along / square).min(1.0), a2);
+    // Opposite directions have no half vector: NaN.
+    if density.is_nan() || density < min {
         return None;
     }
+    let half = half / square.sqrt();
+    let nl = normal.dot(light).clamp(0.0, 1.0);
+    let nv = normal.dot(view).abs().max(1e-4);
     let shadowing = nl * (nv * nv * (1.0 - a2) + a2).sqrt() + nv * (nl * nl * (1.0 - a2) + a2).sqrt();
     Some((density * 0.5 / shadowing.max(1e-6), view.dot(half).clamp(0.0, 1.0)))
 }

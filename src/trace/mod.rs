@@ -8,6 +8,7 @@
 //! camera gives the same values frame after frame.
 
 mod changes;
+mod eye;
 mod form_factor;
 mod ggx;
 mod interaction;
@@ -24,6 +25,7 @@ use crate::accel::{Accel, Ray, Sides};
 use crate::frame::{PackedNormal, RayCounts, SurfaceRef, SurfaceSample};
 use crate::scene::{Pose, Scene, View};
 pub use changes::LightChanges;
+pub use eye::Eye;
 use glam::Vec3;
 use interaction::{Beam, SurfaceInteraction};
 use light::Emitter;
@@ -84,34 +86,17 @@ pub struct Tracer<'a> {
     world: Surroundings<'a>,
 }
 
-/// The eye of a view in render space.
-#[derive(Clone, Copy)]
-struct Eye {
-    position: Vec3,
-    forward: Vec3,
-    perspective: bool,
-    /// Side of a pixel at planar depth 1, or anywhere for orthographic views.
-    pixel: f32,
-}
-
-impl Eye {
-    /// Unit direction from `point` to the eye, and the pixel's beam there.
-    fn seen_from(&self, point: Vec3) -> (Vec3, Beam) {
-        if !self.perspective {
-            return (-self.forward, Beam { width: self.pixel, spread: 0.0 });
-        }
-        let along = point - self.position;
-        let depth = along.dot(self.forward).abs();
-        (-along.normalize_or(self.forward), Beam { width: self.pixel * depth, spread: self.pixel })
-    }
-}
-
 impl<'a> Tracer<'a> {
     /// A tracer of `scene` as `accel` has it placed, under the lights of `pose`.
     pub fn new(scene: &'a Scene, accel: &'a Accel, pose: &Pose, options: TraceOptions) -> Self {
         let lights = pose.lights.iter().map(|l| Emitter::new(l, accel.origin())).collect();
         let layout = Layout::new(scene, options);
         Self { scene, accel, options, lights, layout, world: Surroundings::new(scene) }
+    }
+
+    /// The eye of a view, for everything that is asked of its pixels.
+    pub fn eye(&self, view: &View) -> Eye {
+        Eye::new(view, self.accel)
     }
 
     /// Words of 32 shadow bits that a sample needs; see [`lit_words`].
@@ -122,10 +107,10 @@ impl<'a> Tracer<'a> {
     /// Casts a ray from the eye through raster position (x, y), and from what it meets rays to every light that could
     /// shine there. Says in `lit` which do.
     ///
-    /// The ray starts at the view's near plane and ends at its far plane. Counts `primary`, `shadow` and `ambient`.
-    pub fn cast(&self, view: &View, x: f64, y: f64, lit: &mut [u32], rays: &mut RayCounts) -> SurfaceSample {
+    /// The ray starts at the near plane and ends at the far plane. Counts `primary`, `shadow` and `ambient`.
+    pub fn cast(&self, eye: &Eye, x: f64, y: f64, lit: &mut [u32], rays: &mut RayCounts) -> SurfaceSample {
         lit.fill(0);
-        let (sample, point) = self.first_hit(view, x, y, rays);
+        let (sample, point) = self.first_hit(eye, x, y, rays);
         if let Some(point) = point {
             self.look_for_lights(&point, |_| true, lit, rays);
         }
@@ -133,8 +118,8 @@ impl<'a> Tracer<'a> {
     }
 
     /// Casts a ray from the eye through raster position (x, y), and none to the lights. Counts `primary`.
-    pub fn hit(&self, view: &View, x: f64, y: f64, rays: &mut RayCounts) -> SurfaceSample {
-        self.first_hit(view, x, y, rays).0
+    pub fn hit(&self, eye: &Eye, x: f64, y: f64, rays: &mut RayCounts) -> SurfaceSample {
+        self.first_hit(eye, x, y, rays).0
     }
 
     /// Finds out anew whether the lights of which any bit is set in `ask` reach a sample, and sets or clears their bits
@@ -157,12 +142,12 @@ impl<'a> Tracer<'a> {
     /// of `candidates`; no ray is cast into the scene, and none is counted. Where the candidates are the background, that.
     pub fn nearest_of(
         &self,
-        view: &View,
+        eye: &Eye,
         x: f64,
         y: f64,
         candidates: impl Iterator<Item = SurfaceSample>,
     ) -> Option<SurfaceSample> {
-        let mut ray = self.accel.camera_ray(view, x, y);
+        let mut ray = eye.ray(self.accel, x, y);
         let mut nearest = None;
         for candidate in candidates {
             if candidate.surface.is_background() {
@@ -189,13 +174,13 @@ impl<'a> Tracer<'a> {
     /// background's.
     fn first_hit(
         &self,
-        view: &View,
+        eye: &Eye,
         x: f64,
         y: f64,
         rays: &mut RayCounts,
     ) -> (SurfaceSample, Option<SurfacePoint<'a>>) {
         rays.primary += 1;
-        let ray = self.accel.camera_ray(view, x, y);
+        let ray = eye.ray(self.accel, x, y);
         let Some(hit) = self.accel.intersect(self.scene, &ray, Sides::Visible) else {
             return (SurfaceSample::background(ray.direction.normalize_or(Vec3::NEG_Z)), None);
         };
@@ -238,8 +223,7 @@ impl<'a> Tracer<'a> {
 
     /// What the eye sees of `sample`, whose shadow bits are `lit`: everything that depends on the eye is worked out
     /// anew, for cast and reused samples alike. Counts `reflection` and `refraction`.
-    pub fn shade(&self, view: &View, sample: &SurfaceSample, lit: &[u32], rays: &mut RayCounts) -> Radiance {
-        let eye = self.eye(view);
+    pub fn shade(&self, eye: &Eye, sample: &SurfaceSample, lit: &[u32], rays: &mut RayCounts) -> Radiance {
         if sample.surface.is_background() {
             let emission =
                 finite(self.world.radiance(sample.position, eye.pixel * f32::from(eye.perspective)));
@@ -271,21 +255,21 @@ impl<'a> Tracer<'a> {
 
     /// Unit shading normal of a sample, normal map applied, turned to the side from which it was seen. Zero for
     /// the background.
-    pub fn shading_normal(&self, view: &View, sample: &SurfaceSample) -> Vec3 {
+    pub fn shading_normal(&self, eye: &Eye, sample: &SurfaceSample) -> Vec3 {
         if sample.surface.is_background() {
             return Vec3::ZERO;
         }
-        let (toward, beam) = self.eye(view).seen_from(sample.position);
+        let (toward, beam) = eye.seen_from(sample.position);
         self.interaction(sample, toward, beam).normal
     }
 
     /// The part of a sample's diffuse radiance that light number `light` brings, as far as it reaches it by `lit`.
-    pub fn light_diffuse(&self, view: &View, sample: &SurfaceSample, lit: &[u32], light: usize) -> Vec3 {
+    pub fn light_diffuse(&self, eye: &Eye, sample: &SurfaceSample, lit: &[u32], light: usize) -> Vec3 {
         let share = self.layout.lights.get(light).map_or(0.0, |field| field.share(lit));
         if sample.surface.is_background() || share == 0.0 {
             return Vec3::ZERO;
         }
-        let (toward, beam) = self.eye(view).seen_from(sample.position);
+        let (toward, beam) = eye.seen_from(sample.position);
         let it = self.interaction(sample, toward, beam);
         let Some(unshadowed) = self.lights[light].unshadowed(it.point.position, it.normal) else {
             return Vec3::ZERO;
@@ -299,9 +283,7 @@ impl<'a> Tracer<'a> {
     /// the background, if anything stands there at all. The ray is not counted.
     ///
     /// An orthographic background sample does not say where it is, and is never found hidden.
-    pub fn is_hidden(&self, view: &View, sample: &SurfaceSample) -> bool {
-        let eye = self.eye(view);
-        let (near, far) = (view.lens.near.max(0.0) as f32, view.lens.far as f32);
+    pub fn is_hidden(&self, eye: &Eye, sample: &SurfaceSample) -> bool {
         let (origin, direction, until) = match (eye.perspective, sample.surface.is_background()) {
             (true, true) => (eye.position, sample.position, f32::INFINITY),
             (true, false) => (eye.position, sample.position - eye.position, 1.0 - HIDING_SHARE),
@@ -313,18 +295,9 @@ impl<'a> Tracer<'a> {
         };
         // Planar depth to a length of `direction`.
         let planar = direction.dot(eye.forward);
-        let (t_min, t_max) = (near / planar, (far / planar).min(until));
+        let (t_min, t_max) = (eye.near / planar, (eye.far / planar).min(until));
         let ray = Ray { origin, direction, t_min, t_max };
         planar > 0.0 && self.accel.intersect(self.scene, &ray, Sides::Visible).is_some()
-    }
-
-    fn eye(&self, view: &View) -> Eye {
-        Eye {
-            position: (view.eye - self.accel.origin()).as_vec3(),
-            forward: view.forward.as_vec3(),
-            perspective: view.is_perspective(),
-            pixel: view.pixel_size() as f32,
-        }
     }
 
     fn interaction(&self, sample: &SurfaceSample, toward: Vec3, beam: Beam) -> SurfaceInteraction<'a> {

@@ -1,10 +1,11 @@
 //! A point on a surface: where it is and which way the surface lies, before any texture is asked.
 
 use super::sequence::hash;
-use crate::accel::{Accel, interpolate};
+use crate::accel::{Accel, Placement, interpolate};
 use crate::frame::SurfaceRef;
 use crate::scene::{Material, Mesh, Scene};
 use glam::{Vec3, Vec3A};
+use std::cell::OnceCell;
 
 /// How far a ray starts from its surface, in roundings of the coordinates that the point was computed from. A point
 /// is off by about ten of them, and the tree's own transform of the ray adds as many.
@@ -25,8 +26,11 @@ pub(super) struct SurfacePoint<'a> {
     pub geometric: Vec3,
     /// Whether the side that is seen is the front.
     pub front: bool,
-    /// Metres to stay away from the surface.
-    offset: f32,
+    placement: &'a Placement,
+    /// How large the object's coordinates were that it was computed from.
+    magnitude: Vec3A,
+    /// Metres to stay away from the surface; most points that are only shaded are never asked.
+    offset: OnceCell<f32>,
     surface: SurfaceRef,
 }
 
@@ -56,15 +60,13 @@ impl<'a> SurfacePoint<'a> {
         let material = &scene.materials[mesh.material];
         let placement = accel.placement(index);
         let m = &placement.render_from_object;
-        let roundings = OFFSET_ROUNDINGS * f32::EPSILON * 0.5;
         if let Some(shape) = &mesh.shape {
             let (local, _) = shape.point(surface);
             let position = m.transform_point3(local);
             let outward = accel.shape_normal(scene, surface).unwrap_or(Vec3::Y);
             let front = side.is_front(outward);
             let geometric = if front { outward } else { -outward };
-            let magnitude = m.matrix3.abs() * Vec3A::from(local.abs()) + m.translation.abs();
-            let offset = magnitude.max_element() * roundings;
+            let magnitude = local.abs().into();
             let (corners, weights, edges) = ([0; 3], [0.0; 3], [Vec3::ZERO; 2]);
             return Self {
                 mesh,
@@ -75,7 +77,9 @@ impl<'a> SurfacePoint<'a> {
                 position,
                 geometric,
                 front,
-                offset,
+                placement,
+                magnitude,
+                offset: OnceCell::new(),
                 surface,
             };
         }
@@ -91,11 +95,22 @@ impl<'a> SurfacePoint<'a> {
         let front = side.is_front(outward);
         let geometric = if front { outward } else { -outward };
 
-        let magnitude = m.matrix3.abs()
-            * (a.abs() * weights[0] + b.abs() * weights[1] + c.abs() * weights[2])
-            + m.translation.abs();
-        let offset = (magnitude.max_element() + placement.fused_reach) * roundings;
-        Self { mesh, material, corners, weights, edges, position, geometric, front, offset, surface }
+        let magnitude = a.abs() * weights[0] + b.abs() * weights[1] + c.abs() * weights[2];
+        let offset = OnceCell::new();
+        Self {
+            mesh,
+            material,
+            corners,
+            weights,
+            edges,
+            position,
+            geometric,
+            front,
+            placement,
+            magnitude,
+            offset,
+            surface,
+        }
     }
 
     /// A number that says nothing but which point this is: what is left to chance here is decided by it, and so the
@@ -107,7 +122,13 @@ impl<'a> SurfacePoint<'a> {
 
     /// Where a ray in `direction` starts so that rounding does not make it meet its own surface.
     pub fn start(&self, direction: Vec3) -> Vec3 {
-        let side = if direction.dot(self.geometric) < 0.0 { -self.offset } else { self.offset };
+        let offset = *self.offset.get_or_init(|| {
+            let m = &self.placement.render_from_object;
+            let magnitude = m.matrix3.abs() * self.magnitude + m.translation.abs();
+            let roundings = OFFSET_ROUNDINGS * f32::EPSILON * 0.5;
+            (magnitude.max_element() + self.placement.fused_reach) * roundings
+        });
+        let side = if direction.dot(self.geometric) < 0.0 { -offset } else { offset };
         self.position + self.geometric * side
     }
 }

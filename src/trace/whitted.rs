@@ -139,7 +139,7 @@ fn may_mirror(normal: Vec3, view: Vec3, light: Vec3, chord: f32, alpha: f32) -> 
         return true;
     }
     let nearest = cos * turn.1 + (1.0 - cos * cos).max(0.0).sqrt() * turn.0;
-    density(nearest, alpha * alpha) >= MIN_LOBE
+    density(nearest.max(0.0).powi(2), alpha * alpha) >= MIN_LOBE
 }
 
 impl Tracer<'_> {

@@ -52,7 +52,7 @@ fn an_orthographic_pixel_looks_straight_ahead() {
     let rig = Rig::new(scene);
     let sample = rig.pixel(65.0, 0.0).sample;
     assert!(sample.position.abs().distance(Vec3::new(2.0, 0.0, 2.0)) < 1e-5);
-    assert!(!rig.tracer().is_hidden(&rig.view(), &sample));
+    assert!(!rig.tracer().is_hidden(&rig.tracer().eye(&rig.view()), &sample));
 }
 
 #[test]
@@ -169,11 +169,11 @@ fn the_eye_alone_decides_what_hides_a_sample() {
     let rig = Rig::new(scene.clone());
     let seen = rig.center().sample;
     let sky = Rig::new(Scene { instances: Vec::new(), ..scene.clone() }).center().sample;
-    assert!(!rig.tracer().is_hidden(&rig.view(), &seen));
-    assert!(rig.tracer().is_hidden(&rig.view(), &sky));
+    assert!(!rig.tracer().is_hidden(&rig.tracer().eye(&rig.view()), &seen));
+    assert!(rig.tracer().is_hidden(&rig.tracer().eye(&rig.view()), &sky));
     add_plane(&mut scene, matt(Vec3::ONE), 1.0, at(0.0, 2.0, 0.0));
     let covered = Rig::new(scene);
-    assert!(covered.tracer().is_hidden(&covered.view(), &seen));
+    assert!(covered.tracer().is_hidden(&covered.tracer().eye(&covered.view()), &seen));
 }
 
 #[test]
@@ -185,7 +185,7 @@ fn a_sphere_is_round() {
     scene.add_camera(DVec3::new(0.0, 0.0, 5.0), DVec3::ZERO, 0.5);
     let rig = Rig::new(scene);
     let sample = rig.pixel(40.0, 20.0).sample;
-    let normal = rig.tracer().shading_normal(&rig.view(), &sample);
+    let normal = rig.tracer().shading_normal(&rig.tracer().eye(&rig.view()), &sample);
     assert!((sample.position.length() - 1.0).abs() < 2e-3);
     assert!(normal.angle_between(sample.position) < 2e-3);
     assert!(sample.normal.get().angle_between(sample.position) < 0.05);

@@ -18,8 +18,14 @@ fn a_matt_floor_under_a_point_light_follows_the_inverse_square_and_lamberts_cosi
     assert_eq!((pixel.lit, pixel.rays.primary, pixel.rays.shadow), (vec![1], 1, 1));
     assert_eq!(pixel.rays.total(), 2);
     assert_eq!((pixel.sample.object, pixel.sample.normal.get()), (1, Vec3::Y));
-    assert!(close(rig.tracer().light_diffuse(&rig.view(), &pixel.sample, &[1], 0), expected));
-    assert_eq!(rig.tracer().light_diffuse(&rig.view(), &pixel.sample, &[0], 0), Vec3::ZERO);
+    assert!(close(
+        rig.tracer().light_diffuse(&rig.tracer().eye(&rig.view()), &pixel.sample, &[1], 0),
+        expected
+    ));
+    assert_eq!(
+        rig.tracer().light_diffuse(&rig.tracer().eye(&rig.view()), &pixel.sample, &[0], 0),
+        Vec3::ZERO
+    );
 }
 
 #[test]

@@ -44,10 +44,11 @@ impl Rig {
     }
 
     pub fn pixel(&self, x: f64, y: f64) -> Pixel {
-        let (tracer, view) = (self.tracer(), self.view());
+        let tracer = self.tracer();
+        let eye = tracer.eye(&self.view());
         let (mut lit, mut rays) = (vec![0; tracer.lit_words()], RayCounts::default());
-        let sample = tracer.cast(&view, x, y, &mut lit, &mut rays);
-        let radiance = tracer.shade(&view, &sample, &lit, &mut rays);
+        let sample = tracer.cast(&eye, x, y, &mut lit, &mut rays);
+        let radiance = tracer.shade(&eye, &sample, &lit, &mut rays);
         Pixel { sample, lit, radiance, rays }
     }
 

@@ -51,7 +51,7 @@ fn a_sphere_fills_the_circle_that_it_should() {
     let mut rays = buzz::frame::RayCounts::default();
     let seen = (0..size * size).filter(|i| {
         let (x, y) = (f64::from(i % size) + 0.5, f64::from(i / size) + 0.5);
-        !tracer.hit(&view, x, y, &mut rays).surface.is_background()
+        !tracer.hit(&tracer.eye(&view), x, y, &mut rays).surface.is_background()
     });
     // The cone of lines that touch it has a sine of 1/4.
     let radius = 0.25f64.asin().tan() / 0.3f64.tan() * 200.0;
@@ -118,13 +118,18 @@ fn a_neighbours_shape_gives_the_same_sample() {
         let rig = alone(shape, matt(Vec3::ONE), DVec3::ZERO);
         let (tracer, view) = (rig.tracer(), rig.view());
         let mut rays = buzz::frame::RayCounts::default();
-        let mut sample =
-            |x: u32, y: u32| tracer.hit(&view, f64::from(x) + 0.5, f64::from(y) + 0.5, &mut rays);
+        let mut sample = |x: u32, y: u32| {
+            tracer.hit(&tracer.eye(&view), f64::from(x) + 0.5, f64::from(y) + 0.5, &mut rays)
+        };
         for (x, y) in (1..65).flat_map(|y| (1..65).map(move |x| (x, y))) {
             let (here, before) = (sample(x, y), sample(x - 1, y - 1));
             if !here.surface.is_background() && !before.surface.is_background() {
-                let again =
-                    tracer.nearest_of(&view, f64::from(x) + 0.5, f64::from(y) + 0.5, [before].into_iter());
+                let again = tracer.nearest_of(
+                    &tracer.eye(&view),
+                    f64::from(x) + 0.5,
+                    f64::from(y) + 0.5,
+                    [before].into_iter(),
+                );
                 assert_eq!(again, Some(here));
             }
         }

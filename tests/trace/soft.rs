@@ -192,7 +192,7 @@ fn the_lights_layers_add_up() {
     add_half_screen(&mut scene, 0.1);
     let rig = soft(scene, 16, 0);
     let (pixel, view, tracer) = (rig.center(), rig.view(), rig.tracer());
-    let layers = (0..3).map(|l| tracer.light_diffuse(&view, &pixel.sample, &pixel.lit, l));
+    let layers = (0..3).map(|l| tracer.light_diffuse(&tracer.eye(&view), &pixel.sample, &pixel.lit, l));
     let layers: Vec<Vec3> = layers.collect();
     assert!(layers.iter().all(|l| l.x > 0.0), "{layers:?}");
     assert!(close(layers.iter().sum(), pixel.radiance.diffuse));

@@ -1,0 +1,53 @@
+//! What of a view is the same for every pixel, worked out once: its ray, its beam.
+
+use super::interaction::Beam;
+use crate::accel::{Accel, Ray};
+use crate::scene::View;
+use glam::{DVec2, Vec3};
+
+/// The eye of a view in render space.
+#[derive(Debug, Clone, Copy)]
+pub struct Eye {
+    view: View,
+    half_extent: DVec2,
+    /// Relative to the tracer's origin.
+    pub(super) position: Vec3,
+    pub(super) forward: Vec3,
+    pub(super) perspective: bool,
+    /// Side of a pixel at planar depth 1, or anywhere for orthographic views.
+    pub(super) pixel: f32,
+    pub(super) near: f32,
+    pub(super) far: f32,
+}
+
+impl Eye {
+    pub(super) fn new(view: &View, accel: &Accel) -> Self {
+        Self {
+            view: *view,
+            half_extent: view.half_extent(),
+            position: (view.eye - accel.origin()).as_vec3(),
+            forward: view.forward.as_vec3(),
+            perspective: view.is_perspective(),
+            pixel: view.pixel_size() as f32,
+            near: view.lens.near.max(0.0) as f32,
+            far: view.lens.far as f32,
+        }
+    }
+
+    /// The ray through raster position (x, y), from the near plane to the far plane; its parameter is planar depth.
+    pub(super) fn ray(&self, accel: &Accel, x: f64, y: f64) -> Ray {
+        let ray = self.view.ray_within(self.half_extent, x, y);
+        let origin = if self.perspective { self.position } else { (ray.origin - accel.origin()).as_vec3() };
+        Ray { origin, direction: ray.direction.as_vec3(), t_min: self.near, t_max: self.far }
+    }
+
+    /// Unit direction from `point` to the eye, and the pixel's beam there.
+    pub(super) fn seen_from(&self, point: Vec3) -> (Vec3, Beam) {
+        if !self.perspective {
+            return (-self.forward, Beam { width: self.pixel, spread: 0.0 });
+        }
+        let along = point - self.position;
+        let depth = along.dot(self.forward).abs();
+        (-along.normalize_or(self.forward), Beam { width: self.pixel * depth, spread: self.pixel })
+    }
+}
