@@ -230,7 +230,7 @@ impl Accel {
             all.include(b.max);
             all
         });
-        let Built { tree: upper, order, leaves } = build(&bounds, self.bounds.reach());
+        let Built { tree: upper, order, leaves } = build(&bounds, self.bounds.reach(), 1);
         let lower = placed.iter().filter_map(|placed| match placed {
             Placed::Tree(tree) => Some(self.lower(tree).0.wide.pending()),
             Placed::Shape(_) => None,

@@ -2,12 +2,11 @@
 
 use super::opacity;
 use super::triangle::{TreeTriangle, TrianglePack};
-use super::wide::{MOST_IN_LEAF, WideTree};
+use super::wide::WideTree;
 use crate::scene::Scene;
 use glam::{Affine3A, Vec3};
 use obvhs::aabb::Aabb;
 use obvhs::bvh2::reinsertion::ReinsertionOptimizer;
-use obvhs::cwbvh::bvh2_to_cwbvh::bvh2_to_cwbvh;
 use obvhs::ploc::{PlocBuilder, PlocSearchDistance, SortPrecision};
 use std::ops::Range;
 
@@ -106,10 +105,6 @@ impl Bounds {
         if start.is_finite() { start } else { 0.0 }
     }
 
-    pub fn join(&mut self, other: &Self) {
-        (self.min, self.max) = (self.min.min(other.min), self.max.max(other.max));
-    }
-
     /// Larger on all sides by the padding of a tree that reaches so far.
     fn padded(self, reach: f32) -> Self {
         let padding = Vec3::splat(reach * PADDING);
@@ -141,7 +136,8 @@ impl Tree {
             t.corners.into_iter().for_each(|p| bounds.include(p));
             bounds
         });
-        let Built { tree: wide, order, leaves } = build(&boxes.collect::<Vec<_>>(), bounds.reach());
+        let Built { tree: wide, order, leaves } =
+            build(&boxes.collect::<Vec<_>>(), bounds.reach(), TrianglePack::MOST);
         let pack = |leaf: &Range<usize>| {
             TrianglePack::new(order[leaf.clone()].iter().map(|&i| &triangles[i as usize]))
         };
@@ -163,11 +159,11 @@ pub(super) struct Built {
     pub leaves: Vec<Range<usize>>,
 }
 
-/// An eight-wide tree over boxes that lie within `reach` of the origin.
+/// An eight-wide tree over boxes that lie within `reach` of the origin, at most so many in a leaf.
 ///
 /// The parameters are `BvhBuildParams::medium_build`'s, which build a quarter of a million triangles in a tenth of a
 /// second. Slower presets, splitting long triangles included, traced no faster than the noise of the measurement.
-pub(super) fn build(bounds: &[Bounds], reach: f32) -> Built {
+pub(super) fn build(bounds: &[Bounds], reach: f32, most: usize) -> Built {
     if bounds.is_empty() {
         return Built::default();
     }
@@ -178,10 +174,7 @@ pub(super) fn build(bounds: &[Bounds], reach: f32) -> Built {
     let mut builder = PlocBuilder::with_capacity(boxes.len());
     let mut bvh2 = builder.build(PlocSearchDistance::Medium, &boxes, indices, SortPrecision::U64, 3);
     ReinsertionOptimizer::default().run(&mut bvh2, 0.05, None);
-    let bvh = bvh2_to_cwbvh(&bvh2, MOST_IN_LEAF as u32, true, false);
-    let order = bvh.primitive_indices.clone();
-    let ordered: Vec<Bounds> = order.iter().map(|&i| padded[i as usize]).collect();
-    let (tree, leaves) = WideTree::new(&bvh, &ordered);
+    let (tree, order, leaves) = WideTree::new(&bvh2, most);
     Built { tree, order, leaves }
 }
 

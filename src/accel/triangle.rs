@@ -51,10 +51,13 @@ pub(super) struct PackHits {
 }
 
 impl TrianglePack {
+    /// Triangles in a pack.
+    pub const MOST: usize = 4;
+
     /// Of one to four triangles.
     pub fn new<'a>(triangles: impl Iterator<Item = &'a TreeTriangle>) -> Self {
         let (mut corners, mut numbers) = ([[Vec4::NAN; 3]; 3], [[0; 4]; 3]);
-        for (lane, triangle) in triangles.take(4).enumerate() {
+        for (lane, triangle) in triangles.take(Self::MOST).enumerate() {
             for (axes, corner) in corners.iter_mut().zip(triangle.corners) {
                 axes.iter_mut().zip(corner.to_array()).for_each(|(axis, value)| axis[lane] = value);
             }

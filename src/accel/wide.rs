@@ -1,17 +1,17 @@
-//! An eight-wide tree with boxes in plain single precision, made from `obvhs`'s compressed one.
+//! An eight-wide tree with boxes in plain single precision, made from the binary one that `obvhs` builds.
 //!
-//! `obvhs` builds the tree and decides which nodes are joined to eight. Its compressed nodes are made for GPUs: on plain
-//! x86-64, without the instructions that widen bytes, unpacking them took most of a ray's time, and they are
-//! visited in the order of the ray's octant rather than of distance. These nodes are 2.8 times as large, and
+//! The compressed wide nodes of `obvhs` are made for GPUs: on plain x86-64, without the instructions that widen bytes,
+//! unpacking them took most of a ray's time, they are visited in the order of the ray's octant rather than of
+//! distance, and their leaves hold half as many triangles as can be tested at once. These nodes are 2.8 times as large, and
 //! a ray through them takes about a third less time (59 thousand triangles, seven lights).
+
+mod leaves;
 
 use super::tree::Bounds;
 use glam::{Vec3, Vec4};
-use obvhs::cwbvh::CwBvh;
+use leaves::Leaves;
+use obvhs::bvh2::Bvh2;
 use std::ops::Range;
-
-/// Primitives in a leaf, at most: what `obvhs`'s nodes have room for.
-pub(super) const MOST_IN_LEAF: usize = 3;
 
 /// Marks a child as a leaf; the other bits are its number.
 const LEAF: u32 = 1 << 31;
@@ -81,16 +81,15 @@ impl SlabRay {
 }
 
 impl WideTree {
-    /// The tree with the structure of `bvh`, whose primitives have `bounds` in the tree's order; and for each of its leaves,
-    /// by number, which of them are in it: one to [`MOST_IN_LEAF`].
-    pub fn new(bvh: &CwBvh, bounds: &[Bounds]) -> (Self, Vec<Range<usize>>) {
-        let mut tree = Self { nodes: Vec::with_capacity(bvh.nodes.len()), pending: 0 };
-        let mut leaves = Vec::new();
-        if !bvh.nodes.is_empty() && !bounds.is_empty() {
-            let (_, depth) = tree.add(bvh, bounds, 0, &mut leaves);
-            tree.pending = 7 * depth + 1;
+    /// The tree that `bvh` becomes with at most `most` primitives in a leaf; its primitives in the order of the leaves; and
+    /// which of these are in each leaf, by number.
+    pub fn new(bvh: &Bvh2, most: usize) -> (Self, Vec<u32>, Vec<Range<usize>>) {
+        let mut this = Self::default();
+        let mut leaves = Leaves::new(bvh, most);
+        if !bvh.nodes.is_empty() {
+            this.pending = 7 * this.add(0, &mut leaves) + 1;
         }
-        (tree, leaves)
+        (this, leaves.order, leaves.ranges)
     }
 
     /// Entries that a traversal needs in the slice that it is given.
@@ -102,33 +101,19 @@ impl WideTree {
         size_of_val(self.nodes.as_slice())
     }
 
-    /// Adds a node and all below it; returns its bounds and depth.
-    fn add(
-        &mut self,
-        bvh: &CwBvh,
-        bounds: &[Bounds],
-        index: usize,
-        leaves: &mut Vec<Range<usize>>,
-    ) -> (Bounds, usize) {
-        let source = &bvh.nodes[index];
+    /// Adds what is at or below a node of the binary tree as one node, and all below that; returns its depth.
+    fn add(&mut self, root: usize, leaves: &mut Leaves<'_>) -> usize {
         let number = self.nodes.len();
-        let (mut boxes, mut children) = ([Bounds::default(); 8], [LEAF; 8]);
-        let mut depth = 0;
-        self.nodes.push(WideNode { bounds: [[[Vec4::ZERO; 2]; 2]; 3], children });
-        for slot in 0..8 {
-            if source.is_child_empty(slot) {
-                continue;
-            }
-            if source.is_leaf(slot) {
-                let (first, count) = source.child_primitives(slot);
-                let primitives = first as usize..(first + count) as usize;
-                children[slot] = LEAF | leaves.len() as u32;
-                bounds[primitives.clone()].iter().for_each(|b| boxes[slot].join(b));
-                leaves.push(primitives);
+        self.nodes.push(WideNode { bounds: [[[Vec4::ZERO; 2]; 2]; 3], children: [LEAF; 8] });
+        let (places, count) = leaves.eight(root);
+        let (mut boxes, mut children, mut depth) = ([Bounds::default(); 8], [LEAF; 8], 0);
+        for (slot, &place) in places[..count].iter().enumerate() {
+            boxes[slot] = leaves.bounds(place);
+            if leaves.fits(place) {
+                children[slot] = LEAF | leaves.add(place);
             } else {
                 children[slot] = self.nodes.len() as u32;
-                let below = self.add(bvh, bounds, source.child_node_index(slot) as usize, leaves);
-                (boxes[slot], depth) = (below.0, depth.max(below.1));
+                depth = depth.max(self.add(place, leaves));
             }
         }
         let of = |corner: fn(&Bounds) -> Vec3, axis: usize| {
@@ -137,9 +122,7 @@ impl WideTree {
         };
         let bounds = std::array::from_fn(|axis| [of(|b| b.min, axis), of(|b| b.max, axis)]);
         self.nodes[number] = WideNode { bounds, children };
-        let mut all = Bounds::default();
-        boxes.iter().for_each(|b| all.join(b));
-        (all, depth + 1)
+        depth + 1
     }
 
     /// Visits leaves along the ray, about the nearest first, as long as their boxes begin before `t_max`.

@@ -73,6 +73,10 @@ impl Thumbnails {
         }
     }
 
+    fn exposure(&self) -> Exposure {
+        Exposure::from_p99(self.percentile.get(0.99))
+    }
+
     fn add(&mut self, number: i64, width: usize, color: &[[f32; 4]], depth: &[f32], class: &[u8]) {
         if !self.chosen.contains(&number) || width == 0 || color.is_empty() {
             return;
@@ -93,36 +97,38 @@ impl Thumbnails {
         self.small.insert(number, Small { beauty, exposure, depth, class: class.and_then(|p| webp(&p)) });
     }
 
-    /// The beauty of each frame, under one exposure.
-    pub fn beauties(&self) -> BTreeMap<i64, RgbImage> {
-        let exposure = Exposure::from_p99(self.percentile.get(0.99));
-        let draw = |small: &Small| {
-            let own = image::load_from_memory_with_format(&small.beauty, ImageFormat::Jpeg).ok()?;
-            Some(picture::exposed(&own.into_rgb8(), small.exposure, exposure))
-        };
-        self.small.par_iter().filter_map(|(&number, small)| Some((number, draw(small)?))).collect()
+    /// The beauty of every frame, or of at most so many that are spread evenly, under one exposure.
+    pub fn beauties(&self, most: usize) -> BTreeMap<i64, RgbImage> {
+        let exposure = self.exposure();
+        let step = self.small.len().div_ceil(most.max(1)).max(1);
+        let chosen = self.small.iter().step_by(step);
+        chosen.filter_map(|(&frame, small)| Some((frame, small.beauty(exposure)?))).collect()
     }
 
     /// All pictures, encoded for a page. If they take more than 8 MiB, every second frame is left out until they do
     /// not.
     pub fn encoded(&self) -> Vec<Thumbnail> {
-        let mut all: Vec<Thumbnail> = self
-            .beauties()
-            .into_par_iter()
-            .filter_map(|(frame, beauty)| {
-                let small = self.small.get(&frame)?;
-                Some(Thumbnail {
-                    frame,
-                    beauty: uri("jpeg", &jpeg(&beauty, SHOWN)?),
-                    class: small.class.as_ref().map(|class| uri("webp", class)),
-                    depth: small.depth.as_ref().map(|depth| uri("jpeg", depth)),
-                })
+        let exposure = self.exposure();
+        let encode = |(&frame, small): (&i64, &Small)| {
+            Some(Thumbnail {
+                frame,
+                beauty: uri("jpeg", &jpeg(&small.beauty(exposure)?, SHOWN)?),
+                class: small.class.as_ref().map(|class| uri("webp", class)),
+                depth: small.depth.as_ref().map(|depth| uri("jpeg", depth)),
             })
-            .collect();
+        };
+        let mut all: Vec<Thumbnail> = self.small.par_iter().filter_map(encode).collect();
         while all.len() > 1 && all.iter().map(Thumbnail::bytes).sum::<usize>() > MOST_BYTES {
             all = all.into_iter().step_by(2).collect();
         }
         all
+    }
+}
+
+impl Small {
+    fn beauty(&self, exposure: Exposure) -> Option<RgbImage> {
+        let own = image::load_from_memory_with_format(&self.beauty, ImageFormat::Jpeg).ok()?;
+        Some(picture::exposed(&own.into_rgb8(), self.exposure, exposure))
     }
 }
 
@@ -181,6 +187,7 @@ impl Grid {
 fn jpeg(picture: &RgbImage, quality: u8) -> Option<Vec<u8>> {
     let mut bytes = Vec::new();
     JpegEncoder::new_with_quality(&mut bytes, quality).encode_image(picture).ok()?;
+    bytes.shrink_to_fit();
     Some(bytes)
 }
 
@@ -190,6 +197,7 @@ fn webp(picture: &RgbImage) -> Option<Vec<u8>> {
     let (width, height) = picture.dimensions();
     let encoder = WebPEncoder::new_lossless(&mut bytes);
     encoder.write_image(picture, width, height, ExtendedColorType::Rgb8).ok()?;
+    bytes.shrink_to_fit();
     Some(bytes)
 }
 
@@ -254,7 +262,7 @@ mod tests {
         let exposure = Exposure::from_p99(0.5);
         for (frame, value) in [(0, 0.5), (1, 0.125)] {
             let shown = 255.0 * exposure.encode([value; 4])[0];
-            let [found, ..] = thumbnails.beauties()[&frame].get_pixel(32, 32).0;
+            let [found, ..] = thumbnails.beauties(2)[&frame].get_pixel(32, 32).0;
             assert!((f32::from(found) - shown).abs() <= 2.0, "{found} for {shown}");
         }
     }
@@ -273,7 +281,8 @@ mod tests {
         for frame in &frames {
             thumbnails.add(*frame, 256, &color, &[], &class);
         }
-        assert_eq!(thumbnails.beauties().len(), MOST_FRAMES);
+        assert_eq!(thumbnails.beauties(MOST_FRAMES).len(), MOST_FRAMES);
+        assert_eq!(thumbnails.beauties(24).len(), 23, "every ninth");
         let encoded = thumbnails.encoded();
         assert!(encoded.len() < MOST_FRAMES && encoded.len() > 20, "{}", encoded.len());
         assert!(encoded.iter().map(Thumbnail::bytes).sum::<usize>() <= MOST_BYTES);

@@ -53,9 +53,7 @@ impl Review<'_> {
         write_alone(&folder.join("timeline.otio"), self.timeline(&base).as_bytes())?;
         write_alone(&folder.join("nuke.nk"), self.nuke_script(&base, first, last).as_bytes())?;
         write_alone(&folder.join("blender.py"), self.blender_script(&base, first, last).as_bytes())?;
-        let pictures: Vec<_> = thumbnails.beauties().into_values().collect();
-        let step = pictures.len().div_ceil(SHEET.0).max(1);
-        let pictures: Vec<_> = pictures.into_iter().step_by(step).collect();
+        let pictures: Vec<_> = thumbnails.beauties(SHEET.0).into_values().collect();
         let Some(width) = pictures.first().map(image::RgbImage::width) else { return Ok(()) };
         let path = folder.join("sheet.png");
         let sheet = png(&contact_sheet(&pictures, SHEET.1, width));
