@@ -1,4 +1,4 @@
-//! The same bytes, however the work is cut up. (However often it is killed: `tests/faults.rs`.)
+//! The same bytes, however the work is cut up. (However often it is killed: `faults.rs`.)
 
 use crate::rig::{SMALL, assert_same_bytes, courtyard, fresh, reference, run};
 use std::path::Path;

@@ -4,13 +4,14 @@
 
 mod determinism;
 mod farm;
+#[cfg(unix)]
+mod faults;
 mod layers;
 mod motion;
 mod options;
 mod pipes;
 mod refusals;
 mod resume;
-#[allow(dead_code)] // Shared with `tests/faults.rs`, which uses the rest.
 mod rig;
 mod soft;
 mod stage;

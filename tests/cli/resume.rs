@@ -1,4 +1,4 @@
-//! Frames that are there already. (Damaged and foreign ones: `tests/faults.rs`.)
+//! Frames that are there already. (Damaged and foreign ones: `faults.rs`.)
 
 use crate::rig::{Outcome, frames_in, fresh, json, run};
 use crate::stage::Stage;

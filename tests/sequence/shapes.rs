@@ -1,7 +1,5 @@
 //! Sequences of analytic shapes: as triangles would show them, and inferred as they are traced.
 
-#![allow(missing_docs, clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::print_stdout)]
-
 use buzz::accel::Accel;
 use buzz::frame::{Aov, AovSet, Frame, FrameKind};
 use buzz::measure::{Exposure, psnr};

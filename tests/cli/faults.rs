@@ -1,20 +1,11 @@
 //! What goes wrong around a run: disks, folders, signals, other runs, other files. After each fault nothing is lost, no
 //! file is partial, the exit code says what happened, and the next run brings the folder to the bytes of an undisturbed one.
-#![cfg(unix)]
-#![allow(missing_docs, clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::print_stdout)]
 
-#[allow(dead_code)] // Shared with the other tests of the binary, which use the rest.
-#[path = "cli/rig.rs"]
-mod rig;
-#[allow(dead_code)]
-#[path = "cli/stage.rs"]
-mod stage;
-
-use rig::{
+use crate::rig::{
     BINARY, Outcome, Running, SMALL, assert_same_bytes, courtyard, frames_in, fresh, json, leftovers,
     listing, reference, run, wait_for,
 };
-use stage::{CARD, Stage};
+use crate::stage::{CARD, Stage};
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;

@@ -1,10 +1,8 @@
 //! The half-pixel guarantee against its own error: inferred frames may differ from full ones as much as a full trace does
 //! whose rays are offset at random inside their pixels, and hardly more.
 //!
-//! Both errors are printed (`cargo test --test guarantee -- --nocapture`). The scenes of this repository always run; those
+//! Both errors are printed (`cargo test --release --test sequence guarantee -- --nocapture`). The scenes of this repository always run; those
 //! beside it where they are there. `BUZZ_RESOLUTION=1280x720 BUZZ_FRAMES=all` measures at full size.
-
-#![allow(missing_docs, clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::print_stdout)]
 
 use buzz::accel::Accel;
 use buzz::frame::{Frame, FrameKind};

@@ -2,9 +2,6 @@
 //!
 //! Deterministic, so that a failure can be repeated: the message names the round. `BUZZ_FUZZ_ROUNDS` asks for more.
 
-// Helpers of tests are not tests to clippy.
-#![allow(clippy::unwrap_used, clippy::panic)]
-
 use buzz::import::{ImportOptions, import};
 use serde_json::{Value, json};
 use std::{
@@ -15,8 +12,7 @@ use std::{
 };
 use tempfile::TempDir;
 
-mod gltf_file;
-use gltf_file::{Gltf, base64, png};
+use crate::gltf_file::{Gltf, base64, png};
 
 /// Marsaglia's xorshift.
 struct Dice(u64);

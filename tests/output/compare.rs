@@ -1,16 +1,12 @@
 //! Sequences of files against each other, ours and another renderer's.
 
-#![allow(missing_docs, clippy::unwrap_used, clippy::expect_used, clippy::panic)]
-
-mod support;
-
+use crate::support::{Shape, default_layers, frame, options};
 use buzz::frame::{Frame, FrameKind};
 use buzz::measure::{Comparison, Exposure, compare, psnr, read_frame};
 use buzz::output::Compression;
 use buzz::output::exr::encode;
 use std::fs;
 use std::path::Path;
-use support::{Shape, default_layers, frame, options};
 
 fn plain(number: i64, kind: FrameKind) -> Frame {
     default_layers(frame(number, kind, &Shape::whole(24, 16)))

@@ -1,19 +1,14 @@
 //! Plans of twelve camera paths against the best that there are: each pair of a key frame and a frame is rendered and
 //! counted once, and the best division is found from these counts.
 //!
-//! `cargo test --release --test paths -- --nocapture` prints the table of `docs/planning.md`.
+//! `cargo test --release --test sequence paths -- --nocapture` prints the table of `docs/planning.md`.
 
-#![allow(missing_docs, clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::print_stdout)]
-
-#[path = "../support/chains.rs"]
-mod chains;
-mod moves;
-
+use crate::chains;
+use crate::moves::{self, FRAMES, MOVES};
 use buzz::accel::Accel;
 use buzz::frame::FrameKind;
 use buzz::plan::{LONGEST_SEGMENT, Plan, PlanOptions, Reason, Segment, Weights, plan};
 use buzz::sequence::{Quality, Settings, Unwatched, camera_path};
-use moves::{FRAMES, MOVES};
 
 const WIDTH: u32 = 80;
 const HEIGHT: u32 = 45;

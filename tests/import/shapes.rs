@@ -1,15 +1,11 @@
 //! Analytic shapes in glTF files: what is bound to a node takes the place of its mesh.
 
-// Helpers of tests are not tests to clippy.
-#![allow(missing_docs, clippy::unwrap_used, clippy::panic)]
-
 use buzz::import::{ImportOptions, import};
 use buzz::scene::{Material, Quadric, Requirements, Scene, Shape};
 use glam::DVec3;
 use serde_json::{Value, json};
 
-mod gltf_file;
-use gltf_file::Gltf;
+use crate::gltf_file::Gltf;
 
 /// A file whose triangle's node binds `binding`, with these shapes.
 fn bound(binding: Value, shapes: Value) -> Gltf {

@@ -1,8 +1,5 @@
 //! The importer on small files made by hand: each feature, and each way to be broken.
 
-// Helpers of tests are not tests to clippy.
-#![allow(clippy::unwrap_used, clippy::panic)]
-
 use buzz::{
     Error,
     import::{ImportOptions, import},
@@ -16,8 +13,7 @@ use serde_json::json;
 use std::{fs, path::Path};
 use tempfile::TempDir;
 
-mod gltf_file;
-use gltf_file::{Gltf, base64, png};
+use crate::gltf_file::{Gltf, base64, png};
 
 trait Read {
     fn read(&self) -> Result<Scene, Error>;

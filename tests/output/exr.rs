@@ -1,9 +1,6 @@
 //! The files that frames become: read back by the `exr` crate, and by Python's OpenEXR and OpenImageIO.
 
-#![allow(missing_docs, clippy::unwrap_used, clippy::expect_used, clippy::panic, clippy::print_stdout)]
-
-mod support;
-
+use crate::support::{Shape, default_layers, frame, hash, options};
 use buzz::frame::{Frame, FrameKind, Window};
 use buzz::output::exr::encode;
 use buzz::output::{Compression, ExrSink, FrameFile, NamePattern, OutputFolder, SettingsHasher};
@@ -13,7 +10,6 @@ use serde_json::{Value, json};
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
-use support::{Shape, default_layers, frame, hash, options};
 
 fn sink(folder: &Path, frames: impl IntoIterator<Item = i64>, compression: Compression) -> ExrSink {
     let names = NamePattern::parse("<stem>.%04d.exr", "test").unwrap();

@@ -1,8 +1,5 @@
 //! The importer on scenes that nobody here made, where they lie beside the repository (`../shared/scenes`).
 
-// Helpers of tests are not tests to clippy; what was found is worth reading.
-#![allow(clippy::unwrap_used, clippy::panic, clippy::print_stdout)]
-
 use buzz::{
     Error,
     import::{ImportOptions, import},

@@ -1,0 +1,10 @@
+//! The importer, from files made by hand to files that nobody here made.
+
+// Helpers of tests are not tests to clippy; what was found is worth reading.
+#![allow(missing_docs, clippy::unwrap_used, clippy::panic, clippy::print_stdout)]
+
+mod features;
+mod fuzz;
+mod gltf_file;
+mod shapes;
+mod shared;
