@@ -7,7 +7,7 @@ use super::triangle::{ShearedRay, TreeTriangle, TriangleHit};
 use super::wide::{Pending, SlabRay};
 use super::{Accel, Placed, PlacedTree};
 use crate::frame::SurfaceRef;
-use crate::scene::{Mesh, Scene, View};
+use crate::scene::{CameraRays, Mesh, Scene};
 use glam::Vec3;
 
 /// A ray in render space, relative to [`Accel::origin`], and the part of it that counts.
@@ -21,6 +21,25 @@ pub struct Ray {
     pub t_min: f32,
     /// Nothing farther is met.
     pub t_max: f32,
+}
+
+/// A ray prepared to meet known surfaces, one by one.
+#[derive(Debug, Clone, Copy)]
+pub struct PreparedRay {
+    ray: Ray,
+    sheared: ShearedRay,
+}
+
+impl PreparedRay {
+    /// Prepares a ray.
+    pub fn new(ray: Ray) -> Self {
+        Self { ray, sheared: ShearedRay::new(ray.origin, ray.direction) }
+    }
+
+    /// Ends it where it has met something.
+    pub fn end_at(&mut self, t: f32) {
+        self.ray.t_max = t;
+    }
 }
 
 /// What a ray meets: the little that is needed to go on.
@@ -52,10 +71,10 @@ struct Nearest {
 }
 
 impl Accel {
-    /// The ray of `view` through raster position (x, y), from its near plane to its far plane; its parameter is planar
+    /// The ray of a view through raster position (x, y), from its near plane to its far plane; its parameter is planar
     /// depth.
-    pub fn camera_ray(&self, view: &View, x: f64, y: f64) -> Ray {
-        let ray = view.ray(x, y);
+    pub fn camera_ray(&self, rays: &CameraRays<'_>, x: f64, y: f64) -> Ray {
+        let (ray, view) = (rays.through(x, y), rays.view);
         Ray {
             origin: (ray.origin - self.origin).as_vec3(),
             direction: ray.direction.as_vec3(),
@@ -101,7 +120,8 @@ impl Accel {
 
     /// Where a ray meets one known triangle, if it does, holes cut by alpha considered. Which side it meets does not
     /// matter; nothing else is looked at. Of a known shape, the nearest point that the eye would see is met.
-    pub fn meet(&self, scene: &Scene, ray: &Ray, surface: SurfaceRef) -> Option<RayHit> {
+    pub fn meet(&self, scene: &Scene, ray: &PreparedRay, surface: SurfaceRef) -> Option<RayHit> {
+        let PreparedRay { ray, sheared } = ray;
         let index = surface.instance as usize;
         let mesh = &scene.meshes[scene.instances[index].mesh];
         if mesh.shape.is_some() {
@@ -115,10 +135,9 @@ impl Accel {
         let corners = mesh.triangles[surface.primitive as usize]
             .map(|i| Vec3::from(m.transform_point3a(positions[i as usize].into())));
         let triangle = TreeTriangle::new(corners, surface.primitive, 0, 0);
-        let hit = ShearedRay::new(ray.origin, ray.direction).intersect(&triangle, ray.t_min, ray.t_max)?;
-        let flags = opacity::flags(scene, mesh);
-        let present =
-            flags & EYE_TEST == 0 || opacity::is_present_at(scene, mesh, surface.primitive, hit.u, hit.v);
+        let hit = sheared.intersect(&triangle, ray.t_min, ray.t_max)?;
+        let present = opacity::is_alpha_uniform(scene, mesh)
+            || opacity::is_present_at(scene, mesh, surface.primitive, hit.u, hit.v);
         let front = hit.front ^ (self.placement(index).winding < 0.0);
         present.then_some(RayHit { t: hit.t, surface: SurfaceRef { u: hit.u, v: hit.v, ..surface }, front })
     }

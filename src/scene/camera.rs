@@ -110,6 +110,29 @@ pub struct CameraRay {
     pub direction: DVec3,
 }
 
+/// The rays of a view: what all of them share is worked out once.
+#[derive(Debug, Clone, Copy)]
+pub struct CameraRays<'a> {
+    /// Whose rays they are.
+    pub view: &'a View,
+    half_extent: DVec2,
+}
+
+impl CameraRays<'_> {
+    /// The ray through raster position (x, y).
+    pub fn through(&self, x: f64, y: f64) -> CameraRay {
+        let view = self.view;
+        let ndc = DVec2::new(2.0 * x / f64::from(view.width) - 1.0, 1.0 - 2.0 * y / f64::from(view.height));
+        let on_plane = (ndc + view.lens.shift) * self.half_extent;
+        let across = view.right * on_plane.x + view.up * on_plane.y;
+        if view.is_perspective() {
+            CameraRay { origin: view.eye, direction: view.forward + across }
+        } else {
+            CameraRay { origin: view.eye + across, direction: view.forward }
+        }
+    }
+}
+
 impl View {
     /// Half extent of the image at planar depth 1 (perspective) or anywhere (orthographic).
     pub fn half_extent(&self) -> DVec2 {
@@ -165,16 +188,14 @@ impl View {
         2.0 * self.half_extent().y / f64::from(self.height)
     }
 
+    /// All rays of the view.
+    pub fn rays(&self) -> CameraRays<'_> {
+        CameraRays { view: self, half_extent: self.half_extent() }
+    }
+
     /// The ray through raster position (x, y).
     pub fn ray(&self, x: f64, y: f64) -> CameraRay {
-        let ndc = DVec2::new(2.0 * x / f64::from(self.width) - 1.0, 1.0 - 2.0 * y / f64::from(self.height));
-        let on_plane = (ndc + self.lens.shift) * self.half_extent();
-        let across = self.right * on_plane.x + self.up * on_plane.y;
-        if self.is_perspective() {
-            CameraRay { origin: self.eye, direction: self.forward + across }
-        } else {
-            CameraRay { origin: self.eye + across, direction: self.forward }
-        }
+        self.rays().through(x, y)
     }
 
     /// `camera_from_world` with the world's origin moved to `origin`: rows right, up, forward.

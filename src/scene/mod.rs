@@ -19,7 +19,7 @@ mod shape;
 mod texture;
 mod timing;
 
-pub use camera::{Camera, CameraRay, Lens, Projection, Stereo, View};
+pub use camera::{Camera, CameraRay, CameraRays, Lens, Projection, Stereo, View};
 pub use curve::{Channel, Curve, Interpolation, Target};
 pub use light::{Light, LightKind, Outline, PosedLight, World};
 pub use material::{AlphaMode, Material, NormalTexture, Volume};

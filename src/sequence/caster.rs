@@ -4,14 +4,14 @@ use super::Observer;
 use super::motion::SceneMotion;
 use crate::frame::{RayCounts, SurfaceSample};
 use crate::infer::{CastCentres, CastRays, Motion};
-use crate::scene::View;
+use crate::scene::{CameraRays, View};
 use crate::trace::Tracer;
 use glam::Vec3;
 
 /// Casts the rays of one frame.
 pub(super) struct Caster<'a> {
     pub tracer: &'a Tracer<'a>,
-    pub view: &'a View,
+    pub rays: CameraRays<'a>,
     pub observer: &'a dyn Observer,
     /// See [`super::Settings::jitter`]; differs from frame to frame.
     pub jitter: Option<u64>,
@@ -21,7 +21,7 @@ pub(super) struct Caster<'a> {
 
 impl CastRays for Caster<'_> {
     fn turned(&self, old: &View) -> Vec<[Vec3; 3]> {
-        self.tracer.turned(old, self.view)
+        self.tracer.turned(old, self.rays.view)
     }
 
     fn is_cancelled(&self) -> bool {
@@ -33,7 +33,7 @@ impl CastRays for Caster<'_> {
             let bits = mix(seed ^ ((y as u64) << 32 | x as u64));
             [bits as u32, (bits >> 32) as u32].map(|b| f64::from(b) / (f64::from(u32::MAX) + 1.0))
         });
-        self.tracer.cast(self.view, x as f64 + offset[0], y as f64 + offset[1], lit, counts)
+        self.tracer.cast(self.rays.view, x as f64 + offset[0], y as f64 + offset[1], lit, counts)
     }
 
     fn motion(&self) -> Option<&dyn Motion> {
@@ -43,7 +43,7 @@ impl CastRays for Caster<'_> {
 
 impl CastCentres for Caster<'_> {
     fn hit(&self, x: usize, y: usize, counts: &mut RayCounts) -> SurfaceSample {
-        self.tracer.hit(self.view, x as f64 + 0.5, y as f64 + 0.5, counts)
+        self.tracer.hit(self.rays.view, x as f64 + 0.5, y as f64 + 0.5, counts)
     }
 
     fn recast(&self, sample: &SurfaceSample, ask: &[u32], lit: &mut [u32], counts: &mut RayCounts) {
@@ -60,12 +60,12 @@ impl CastCentres for Caster<'_> {
         y: usize,
         candidates: impl Iterator<Item = SurfaceSample>,
     ) -> Option<SurfaceSample> {
-        self.tracer.nearest_of(self.view, x as f64 + 0.5, y as f64 + 0.5, candidates)
+        self.tracer.nearest_of(&self.rays, x as f64 + 0.5, y as f64 + 0.5, candidates)
     }
 
     fn is_hidden(&self, sample: &SurfaceSample, counts: &mut RayCounts) -> bool {
         counts.visibility += 1;
-        self.tracer.is_hidden(self.view, sample)
+        self.tracer.is_hidden(self.rays.view, sample)
     }
 }
 

@@ -292,7 +292,7 @@ impl Emitter<'_> {
         motion: Option<&'a SceneMotion<'a>>,
     ) -> Caster<'a> {
         let jitter = self.settings.jitter.map(|seed| mix(seed ^ shot.frame as u64));
-        Caster { tracer, view: &shot.view, observer: &*self.observer, jitter, motion }
+        Caster { tracer, rays: shot.view.rays(), observer: &*self.observer, jitter, motion }
     }
 
     /// Casts a ray through every pixel.

@@ -123,8 +123,12 @@ fn a_neighbours_shape_gives_the_same_sample() {
         for (x, y) in (1..65).flat_map(|y| (1..65).map(move |x| (x, y))) {
             let (here, before) = (sample(x, y), sample(x - 1, y - 1));
             if !here.surface.is_background() && !before.surface.is_background() {
-                let again =
-                    tracer.nearest_of(&view, f64::from(x) + 0.5, f64::from(y) + 0.5, [before].into_iter());
+                let again = tracer.nearest_of(
+                    &view.rays(),
+                    f64::from(x) + 0.5,
+                    f64::from(y) + 0.5,
+                    [before].into_iter(),
+                );
                 assert_eq!(again, Some(here));
             }
         }
