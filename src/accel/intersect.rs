@@ -23,6 +23,25 @@ pub struct Ray {
     pub t_max: f32,
 }
 
+/// A ray prepared to meet known surfaces, one by one.
+#[derive(Debug, Clone, Copy)]
+pub struct PreparedRay {
+    ray: Ray,
+    sheared: ShearedRay,
+}
+
+impl PreparedRay {
+    /// Prepares a ray.
+    pub fn new(ray: Ray) -> Self {
+        Self { ray, sheared: ShearedRay::new(ray.origin, ray.direction) }
+    }
+
+    /// Ends it where it has met something.
+    pub fn end_at(&mut self, t: f32) {
+        self.ray.t_max = t;
+    }
+}
+
 /// What a ray meets: the little that is needed to go on.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct RayHit {
@@ -93,7 +112,8 @@ impl Accel {
 
     /// Where a ray meets one known triangle, if it does, holes cut by alpha considered. Which side it meets does not
     /// matter; nothing else is looked at. Of a known shape, the nearest point that the eye would see is met.
-    pub fn meet(&self, scene: &Scene, ray: &Ray, surface: SurfaceRef) -> Option<RayHit> {
+    pub fn meet(&self, scene: &Scene, ray: &PreparedRay, surface: SurfaceRef) -> Option<RayHit> {
+        let PreparedRay { ray, sheared } = ray;
         let index = surface.instance as usize;
         let mesh = &scene.meshes[scene.instances[index].mesh];
         if mesh.shape.is_some() {
@@ -108,11 +128,9 @@ impl Accel {
             .map(|i| Vec3::from(m.transform_point3a(positions[i as usize].into())));
         let triangle = TreeTriangle { corners, primitive: surface.primitive, part: 0, flags: 0 };
         let pack = TrianglePack::new([triangle].iter());
-        let mut hits = ShearedRay::new(ray.origin, ray.direction).intersect(&pack, ray.t_min, ray.t_max);
-        let (_, hit) = hits.next()?;
-        let flags = opacity::flags(scene, mesh);
-        let present =
-            flags & EYE_TEST == 0 || opacity::is_present_at(scene, mesh, surface.primitive, hit.u, hit.v);
+        let (_, hit) = sheared.intersect(&pack, ray.t_min, ray.t_max).next()?;
+        let present = opacity::is_alpha_uniform(scene, mesh)
+            || opacity::is_present_at(scene, mesh, surface.primitive, hit.u, hit.v);
         let front = hit.front ^ (self.placement(index).winding < 0.0);
         present.then_some(RayHit { t: hit.t, surface: SurfaceRef { u: hit.u, v: hit.v, ..surface }, front })
     }

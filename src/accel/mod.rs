@@ -27,7 +27,7 @@ use deform::{Deformed, Shape, affine, is_deformable};
 pub use displaced::{Displaced, Posed};
 use fused::Fused;
 use glam::{Affine3A, DAffine3, DVec3, Mat3A, Vec3, Vec3A, Vec4};
-pub use intersect::{Ray, RayHit, Sides};
+pub use intersect::{PreparedRay, Ray, RayHit, Sides};
 use placed_shape::PlacedShape;
 use rayon::prelude::*;
 use std::collections::HashMap;

@@ -31,6 +31,13 @@ pub(super) fn culls_back(scene: &Scene, mesh: &Mesh) -> bool {
     !double_sided && material.transmission == 0.0
 }
 
+/// True if alpha does not differ from place to place, so that nobody has to ask for it.
+pub(super) fn is_alpha_uniform(scene: &Scene, mesh: &Mesh) -> bool {
+    let material = &scene.materials[mesh.material];
+    material.alpha_mode == AlphaMode::Opaque
+        || (material.base_color_texture.is_none() && mesh.colors.is_empty())
+}
+
 /// The flags of triangles of `mesh`, or of its shape.
 pub(super) fn flags(scene: &Scene, mesh: &Mesh) -> u32 {
     let material = &scene.materials[mesh.material];
@@ -38,8 +45,7 @@ pub(super) fn flags(scene: &Scene, mesh: &Mesh) -> u32 {
     if culls_back(scene, mesh) {
         flags |= CULL_BACK;
     }
-    let uniform_alpha = material.alpha_mode == AlphaMode::Opaque
-        || (material.base_color_texture.is_none() && mesh.colors.is_empty());
+    let uniform_alpha = is_alpha_uniform(scene, mesh);
     if !uniform_alpha {
         flags |= EYE_TEST;
     } else if !is_present(material, material.base_color.w) {

@@ -1,11 +1,10 @@
 //! What the samples that landed around a pixel say about it: whether they lie on one surface, and which lights reach it.
 
-use super::Marks;
 use super::buzz_buffer::{BuzzBuffer, Projector};
 use super::centre::CastCentres;
-use super::project::Landings;
-use crate::frame::{PixelClass, SurfaceSample};
-use rayon::prelude::*;
+use super::sources::{MOVED, NOTHING, SUSPECT, Sources};
+use crate::frame::SurfaceSample;
+use glam::Vec3;
 
 /// Two samples lie on one surface if either is within this many pixel widths of the other's tangent plane.
 const STEP: f32 = 1.0;
@@ -17,18 +16,6 @@ const SAME_FACING: f32 = 0.9;
 /// Fewer are all on one side of it, as at the foot of a wall, where a shadow begins.
 const ENOUGH_TO_LEND: usize = 6;
 
-/// A sample that landed this near to its pixel's centre, in pixels, is as good as at it.
-const AT_CENTRE: f32 = 1.0 / 256.0;
-
-/// Nothing landed on the pixel. The numbers of old pixels are below: an image has fewer than 2^30 pixels.
-const NOTHING: u32 = (1 << 30) - 1;
-
-/// Set where something unknown may stand before what landed on the pixel, if anything did.
-const SUSPECT: u32 = 1 << 31;
-
-/// Set where what landed on the pixel is away from its centre.
-const MOVED: u32 = 1 << 30;
-
 /// How much is believed without a ray.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Trust {
@@ -39,55 +26,31 @@ pub enum Trust {
     Proof,
 }
 
-/// For each pixel: the old pixel whose sample landed on it, and whether that is to be believed.
-#[derive(Debug, Default)]
-pub struct Sources(Vec<u32>);
+/// Old pixels whose samples landed near one another, in rows from the top.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Nearby {
+    pixels: [u32; 25],
+    count: usize,
+}
 
-impl Sources {
-    /// Settles it for all pixels, once all lines have been walked.
-    pub fn settle(&mut self, old: &BuzzBuffer, view: &Projector, landings: &Landings, marks: &Marks) {
-        let width = old.width();
-        self.0.resize(old.object.len(), NOTHING);
-        self.0.par_chunks_mut(width).with_min_len(8).enumerate().for_each(|(y, row)| {
-            for (x, source) in row.iter_mut().enumerate() {
-                let pixel = y * width + x;
-                *source = landings.source(pixel).map_or(NOTHING, |i| {
-                    let flag = if is_at_centre(old, i, view, x, y) { 0 } else { MOVED };
-                    i as u32 | flag
-                });
-                if matches!(
-                    marks.get(pixel),
-                    Some(PixelClass::Bad | PixelClass::Moved | PixelClass::Entering)
-                ) {
-                    *source |= SUSPECT;
-                }
-            }
-        });
+impl Nearby {
+    const NONE: Self = Self { pixels: [0; 25], count: 0 };
+
+    fn push(&mut self, i: usize) {
+        self.pixels[self.count] = i as u32;
+        self.count += 1;
     }
 
-    /// The old pixel whose sample landed here.
-    pub fn of(&self, pixel: usize) -> Option<usize> {
-        let source = self.0[pixel] & NOTHING;
-        (source != NOTHING).then_some(source as usize)
-    }
-
-    /// True if a sample landed on the pixel's very centre.
-    pub fn is_centred(&self, pixel: usize) -> bool {
-        self.of(pixel).is_some() && self.0[pixel] & MOVED == 0
-    }
-
-    /// True if something unknown may stand in front here.
-    pub fn is_suspect(&self, pixel: usize) -> bool {
-        self.0[pixel] & SUSPECT != 0
+    pub fn iter(&self) -> impl Iterator<Item = usize> + Clone {
+        self.pixels[..self.count].iter().map(|&i| i as usize)
     }
 }
 
-/// The samples that landed around a pixel and on it, in rows from the top.
+/// The samples that landed around a pixel and on it.
 pub(super) struct Around<'a> {
     old: &'a BuzzBuffer,
     view: &'a Projector,
-    known: [u32; 25],
-    count: usize,
+    known: Nearby,
     /// Pixels looked at: those outside the image are not.
     size: usize,
     suspect: bool,
@@ -105,15 +68,14 @@ impl<'a> Around<'a> {
     ) -> Self {
         let (width, height) = (old.width(), old.height());
         let (first, last) = (x.saturating_sub(reach), (x + reach).min(width - 1));
-        let mut this = Self { old, view, known: [0; 25], count: 0, size: 0, suspect: false, moved: false };
+        let mut this = Self { old, view, known: Nearby::NONE, size: 0, suspect: false, moved: false };
         for y in y.saturating_sub(reach)..=(y + reach).min(height - 1) {
-            for &source in &sources.0[y * width + first..=y * width + last] {
+            for &source in sources.row(width, y, first..=last) {
                 this.size += 1;
                 this.suspect |= source & SUSPECT != 0;
                 this.moved |= source & MOVED != 0;
                 if source & NOTHING != NOTHING {
-                    this.known[this.count] = source & NOTHING;
-                    this.count += 1;
+                    this.known.push((source & NOTHING) as usize);
                 }
             }
         }
@@ -122,12 +84,12 @@ impl<'a> Around<'a> {
 
     /// Old pixels whose samples are known here.
     pub fn known(&self) -> impl Iterator<Item = usize> + Clone {
-        self.known[..self.count].iter().map(|&i| i as usize)
+        self.known.iter()
     }
 
     /// True where a sample landed on every pixel.
     pub fn is_complete(&self) -> bool {
-        self.count == self.size
+        self.known.count == self.size
     }
 
     /// True where a sample landed on the centre of every pixel: nothing has moved here.
@@ -135,19 +97,24 @@ impl<'a> Around<'a> {
         !self.moved && !self.suspect && self.is_complete()
     }
 
-    /// True where nothing unknown may stand in front, and all samples around lie on the surface of old sample `i`.
-    pub fn shows_one_surface(&self, i: usize) -> bool {
-        let sample = self.old.sample(i);
-        !self.suspect
-            && self.known().all(|k| {
-                is_same_primitive(self.old, i, k) || is_one_surface(&sample, &self.old.sample(k), self.view)
-            })
-    }
-
-    /// The samples that name the triangles of this neighbourhood, that of old sample `i` first.
-    pub fn candidates(&self, i: usize) -> impl Iterator<Item = SurfaceSample> {
-        let others = self.known().filter(move |&k| !is_same_primitive(self.old, i, k));
-        std::iter::once(i).chain(others).map(|k| self.old.sample(k))
+    /// Samples that name the triangles of this neighbourhood, each once, that of old sample `i` first; none unless nothing
+    /// unknown may stand in front, and all samples around lie on the surface of `i`.
+    pub fn one_surface(&self, i: usize) -> Option<Nearby> {
+        if self.suspect {
+            return None;
+        }
+        let mut triangles = Nearby::NONE;
+        triangles.push(i);
+        let tangent = Tangent::new(self.old.sample(i), self.view);
+        for k in self.known().filter(|&k| !self.old.is_same_primitive(i, k)) {
+            if !tangent.reaches(&self.old.sample(k)) {
+                return None;
+            }
+            if !triangles.iter().any(|named| self.old.is_same_primitive(named, k)) {
+                triangles.push(k);
+            }
+        }
+        Some(triangles)
     }
 
     /// Sets in `ask` the bits of the lights about which the samples around disagree, and clears all others.
@@ -155,7 +122,7 @@ impl<'a> Around<'a> {
         if trust == Trust::Proof && !self.is_complete() {
             ask.fill(u32::MAX);
         } else {
-            differing(rays, self.old, self.known(), ask);
+            differing(rays, self.old, &self.known, ask);
         }
     }
 
@@ -169,15 +136,20 @@ impl<'a> Around<'a> {
         lit: &mut [u32],
         ask: &mut [u32],
     ) {
-        let normal = sample.normal.get();
-        let lenders = self.known().filter(|&k| {
+        let tangent = Tangent::new(*sample, self.view);
+        let mut lenders = Nearby::NONE;
+        for k in self.known() {
             let lender = self.old.sample(k);
-            normal.dot(lender.normal.get()) > SAME_FACING && is_one_surface(sample, &lender, self.view)
-        });
+            let faces_alike =
+                lender.normal == sample.normal || tangent.normal.dot(lender.normal.get()) > SAME_FACING;
+            if faces_alike && tangent.reaches(&lender) {
+                lenders.push(k);
+            }
+        }
         let enough = if trust == Trust::Proof { self.size } else { ENOUGH_TO_LEND };
-        match lenders.clone().next() {
-            Some(first) if lenders.clone().count() >= enough => {
-                differing(rays, self.old, lenders, ask);
+        match lenders.iter().next() {
+            Some(first) if lenders.count >= enough => {
+                differing(rays, self.old, &lenders, ask);
                 lit.copy_from_slice(self.old.lit(first));
             }
             _ => ask.fill(u32::MAX),
@@ -186,38 +158,48 @@ impl<'a> Around<'a> {
 }
 
 /// Sets the bits of lights on which `samples` do not all agree with the first, and clears all others.
-fn differing(
-    rays: &impl CastCentres,
-    old: &BuzzBuffer,
-    mut samples: impl Iterator<Item = usize>,
-    differ: &mut [u32],
-) {
+fn differing(rays: &impl CastCentres, old: &BuzzBuffer, samples: &Nearby, differ: &mut [u32]) {
     differ.fill(0);
-    let Some(first) = samples.next() else { return };
-    for sample in samples {
+    let Some(first) = samples.iter().next() else { return };
+    for sample in samples.iter().filter(|&sample| !old.is_lit_alike(first, sample)) {
         rays.differ(old.lit(first), old.lit(sample), differ);
     }
 }
 
-fn is_at_centre(old: &BuzzBuffer, i: usize, view: &Projector, x: usize, y: usize) -> bool {
-    let at = view.project(old.position[i], old.normal[i].get(), old.surface[i].is_background());
-    at.is_some_and(|p| (p.x - x as f32 - 0.5).abs() < AT_CENTRE && (p.y - y as f32 - 0.5).abs() < AT_CENTRE)
+/// A sample's tangent plane, to hold many samples against it.
+struct Tangent<'a> {
+    sample: SurfaceSample,
+    normal: Vec3,
+    /// How far off the plane the same surface may be as far as this sample's own pixel goes, metres.
+    step: f32,
+    view: &'a Projector,
 }
 
-fn is_same_primitive(old: &BuzzBuffer, a: usize, b: usize) -> bool {
-    let (a, b) = (&old.surface[a], &old.surface[b]);
-    (a.instance, a.primitive) == (b.instance, b.primitive)
+impl<'a> Tangent<'a> {
+    fn new(sample: SurfaceSample, view: &'a Projector) -> Self {
+        let step = STEP * view.pixel_width(sample.position);
+        Self { sample, normal: sample.normal.get(), step, view }
+    }
+
+    /// See [`is_one_surface`].
+    fn reaches(&self, other: &SurfaceSample) -> bool {
+        if self.sample.object != other.object {
+            return false;
+        }
+        if self.sample.surface.is_background() {
+            return true;
+        }
+        let between = other.position - self.sample.position;
+        let off = between.dot(self.normal).abs();
+        // Nearly all are within the first.
+        off <= self.step || {
+            let step = self.step.max(STEP * self.view.pixel_width(other.position));
+            off <= step || between.dot(other.normal.get()).abs() <= step
+        }
+    }
 }
 
 /// True where two samples lie on one surface, with no step between them.
 pub fn is_one_surface(a: &SurfaceSample, b: &SurfaceSample, view: &Projector) -> bool {
-    if a.object != b.object {
-        return false;
-    }
-    if a.surface.is_background() {
-        return true;
-    }
-    let between = b.position - a.position;
-    let step = STEP * view.pixel_width(a.position).max(view.pixel_width(b.position));
-    between.dot(a.normal.get()).abs() <= step || between.dot(b.normal.get()).abs() <= step
+    Tangent::new(*a, view).reaches(b)
 }

@@ -78,6 +78,7 @@ impl BuzzBuffer {
     }
 
     /// The sample of pixel number `i`.
+    #[inline]
     pub fn sample(&self, i: usize) -> SurfaceSample {
         SurfaceSample {
             position: self.position[i],
@@ -88,8 +89,20 @@ impl BuzzBuffer {
     }
 
     /// The shadow bits of pixel number `i`.
+    #[inline]
     pub fn lit(&self, i: usize) -> &[u32] {
         &self.lit[i * self.lit_words..][..self.lit_words]
+    }
+
+    /// True if two pixels show one triangle, or one face of a shape.
+    pub(super) fn is_same_primitive(&self, a: usize, b: usize) -> bool {
+        let (a, b) = (&self.surface[a], &self.surface[b]);
+        (a.instance, a.primitive) == (b.instance, b.primitive)
+    }
+
+    /// True if two pixels have the same shadow bits: mostly a word, which is compared without a call.
+    pub(super) fn is_lit_alike(&self, a: usize, b: usize) -> bool {
+        self.lit(a).iter().eq(self.lit(b))
     }
 
     /// Becomes the same as `other`, in the memory that it has.

@@ -15,11 +15,12 @@
 //! around a wrong bit disagree with it, so an error does not live on.
 
 use super::Marks;
-use super::around::{Around, Sources, Trust, is_one_surface};
+use super::around::{Around, Trust, is_one_surface};
 use super::buzz_buffer::{BuzzBuffer, CastRays, Projector, Row, UNKNOWN};
 use super::moved::Askers;
 use super::project::Landings;
 use super::shadow_edges::ShadowEdges;
+use super::sources::{Alike, Sources};
 use crate::frame::{PixelClass, RayCounts, SurfaceSample};
 use rayon::prelude::*;
 
@@ -92,7 +93,7 @@ impl Centring {
         trust: Trust,
         new: &mut BuzzBuffer,
     ) {
-        self.sources.settle(old, view, landings, marks);
+        self.sources.settle(landings, marks);
         let (width, words) = (old.width(), old.lit_words());
         // Without lights there are no words, but a chunk's length may not be zero.
         self.ask.resize((old.object.len() * words).max(old.height()), 0);
@@ -100,7 +101,7 @@ impl Centring {
         let rows = new.rows_mut().zip(self.ask.par_chunks_mut((width * words).max(1)));
         rows.enumerate().for_each(|(y, (mut row, ask))| {
             ask.fill(0);
-            for x in 0..width {
+            for (x, alike) in sources.alike(old, y).enumerate() {
                 let (pixel, ask) = (y * width + x, &mut ask[x * words..][..words]);
                 let own = sources.of(pixel);
                 row.object[x] = UNKNOWN;
@@ -109,25 +110,39 @@ impl Centring {
                     (None, _) => PixelClass::Missed,
                     (_, mark) => mark.unwrap_or(PixelClass::Good),
                 };
+                let mut reuse = |i: usize, sample: &SurfaceSample| {
+                    row.put(x, view, sample);
+                    row.lit_mut(x).copy_from_slice(old.lit(i));
+                };
                 if sources.is_suspect(pixel) {
+                    continue;
+                }
+                // Within a triangle that is lit the same all around there is no more to find out.
+                if let Some(Alike { source, moved }) = alike {
+                    let sample = old.sample(source);
+                    let centred =
+                        if moved { rays.nearest_of(x, y, std::iter::once(sample)) } else { Some(sample) };
+                    match centred {
+                        Some(sample) => reuse(source, &sample),
+                        None => row.class[x] = PixelClass::Edge,
+                    }
                     continue;
                 }
                 let around = Around::new(old, view, sources, (x, y), 1);
                 if let Some(i) = own
                     && around.stands_still()
                 {
-                    row.put(x, view, &old.sample(i));
-                    row.lit_mut(x).copy_from_slice(old.lit(i));
+                    reuse(i, &old.sample(i));
                     continue;
                 }
                 let nearby = || around.known().next().filter(|_| around.known().count() >= ENOUGH_TO_FILL);
-                let centred = own.or_else(nearby).filter(|&i| around.shows_one_surface(i)).and_then(|i| {
-                    let sample = rays.nearest_of(x, y, around.candidates(i))?;
+                let centred = own.or_else(nearby).and_then(|i| {
+                    let triangles = around.one_surface(i)?;
+                    let sample = rays.nearest_of(x, y, triangles.iter().map(|k| old.sample(k)))?;
                     Some((i, sample))
                 });
                 if let Some((i, sample)) = centred {
-                    row.put(x, view, &sample);
-                    row.lit_mut(x).copy_from_slice(old.lit(i));
+                    reuse(i, &sample);
                     // Where it is the very sample that landed here, its lights are known.
                     if !sources.is_centred(pixel) {
                         // A hole may hide a shadow's edge: then look farther.

@@ -30,9 +30,13 @@ pub fn obscured(
 ) {
     let (width, height) = (old.width(), old.height());
     (0..height).into_par_iter().with_min_len(8).for_each(|y| {
+        let (mut left, mut middle) = (None, Column::new(old, 0, y));
         for x in 0..width {
             let i = y * width + x;
-            if old.surface[i].is_background() || !hides_something(old, x, y) {
+            let right = Column::new(old, x + 1, y);
+            let smooth = is_smooth(old.z[i], [left, middle, right]);
+            (left, middle) = (middle, right);
+            if smooth || old.surface[i].is_background() || !hides_something(old, x, y) {
                 continue;
             }
             let position = old.position[i];
@@ -53,6 +57,35 @@ pub fn obscured(
             }
         }
     });
+}
+
+/// Three pixels over one another that show one object.
+#[derive(Clone, Copy)]
+struct Column {
+    object: u32,
+    deepest: f32,
+}
+
+impl Column {
+    /// The column of pixel (x, y), if it is in the image and of one object.
+    fn new(old: &BuzzBuffer, x: usize, y: usize) -> Option<Self> {
+        let width = old.width();
+        if x >= width || y == 0 || y + 1 >= old.height() {
+            return None;
+        }
+        let i = y * width + x;
+        let [above, object, below] = [i - width, i, i + width].map(|n| old.object[n]);
+        let deepest = old.z[i - width].max(old.z[i]).max(old.z[i + width]);
+        (above == object && below == object).then_some(Self { object, deepest })
+    }
+}
+
+/// True where the 3x3 around a sample at depth `z` is of one object without a step down: it hides nothing, as nearly
+/// everywhere.
+fn is_smooth(z: f32, columns: [Option<Column>; 3]) -> bool {
+    let [Some(left), Some(middle), Some(right)] = columns else { return false };
+    let one_object = left.object == middle.object && right.object == middle.object;
+    one_object && left.deepest.max(middle.deepest).max(right.deepest) <= z * DEPTH_STEP
 }
 
 /// True where one of the eight neighbours lies behind the sample, or is not known because the image ends.

@@ -1,19 +1,23 @@
 //! Projection of the old samples into the new view: the nearest hit on a pixel wins.
 
 use super::Marks;
-use super::buzz_buffer::{BuzzBuffer, Projector, UNKNOWN};
+use super::buzz_buffer::{BuzzBuffer, Projected, Projector, UNKNOWN};
 use crate::frame::PixelClass;
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
 
 /// Depth and old pixel of the nearest sample that landed on a pixel, as one number that a single atomic minimum can
-/// decide: the depth's bits (positive floats order like integers) above the old pixel's number. Ties go to the
-/// lower number, so the result depends on neither the order of pixels nor the number of threads.
+/// decide: the depth's bits (positive floats order like integers) above the old pixel's number, and below that whether it
+/// landed away from the pixel's centre. Ties go to the lower number, so the result depends on neither the order of pixels
+/// nor the number of threads.
 #[derive(Debug, Default)]
 pub struct Landings(Vec<AtomicU64>);
 
 /// Nothing landed.
 const EMPTY: u64 = u64::MAX;
+
+/// A sample that landed this near to its pixel's centre, in pixels, is as good as at it.
+const AT_CENTRE: f32 = 1.0 / 256.0;
 
 impl Landings {
     /// Empties all pixels ("all z values = HUGE and id_tag to -2").
@@ -22,9 +26,16 @@ impl Landings {
         self.0.par_iter_mut().with_min_len(1 << 14).for_each(|l| *l.get_mut() = EMPTY);
     }
 
-    /// Lands old sample `i` at depth `z` on a pixel; marks the pixel if another is there.
-    pub(super) fn land(&self, pixel: usize, z: f32, i: usize, marks: &Marks) {
-        let landing = u64::from(z.to_bits()) << 32 | i as u64;
+    /// Number of pixels.
+    pub(super) fn len(&self) -> usize {
+        self.0.len()
+    }
+
+    /// Lands old sample `i` on the pixel that holds it; marks the pixel if another is there.
+    pub(super) fn land(&self, pixel: usize, at: Projected, i: usize, marks: &Marks) {
+        let is_away = |raster: f32| (raster - raster.trunc() - 0.5).abs() >= AT_CENTRE;
+        let away = is_away(at.x) || is_away(at.y);
+        let landing = u64::from(at.z.to_bits()) << 32 | (i as u64) << 1 | u64::from(away);
         if self.0[pixel].fetch_min(landing, Relaxed) != EMPTY {
             marks.set(pixel, PixelClass::Overlapped);
         }
@@ -38,8 +49,13 @@ impl Landings {
 
     /// The old pixel whose sample landed here; none where nothing did.
     pub fn source(&self, pixel: usize) -> Option<usize> {
+        self.landed(pixel).map(|(i, _)| i)
+    }
+
+    /// The old pixel whose sample landed here, and whether it did so away from the centre.
+    pub(super) fn landed(&self, pixel: usize) -> Option<(usize, bool)> {
         let landing = self.0[pixel].load(Relaxed);
-        (landing != EMPTY).then_some(landing as u32 as usize)
+        (landing != EMPTY).then_some((landing as u32 as usize >> 1, landing & 1 != 0))
     }
 }
 
@@ -60,7 +76,7 @@ pub fn project(old: &BuzzBuffer, new_view: &Projector, landings: &Landings, mark
             };
             nearest = nearest.min(p.z);
             let Some(pixel) = new_view.pixel(p.x, p.y) else { continue };
-            landings.land(pixel, p.z, i, marks);
+            landings.land(pixel, p, i, marks);
         }
         nearest
     };

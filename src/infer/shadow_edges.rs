@@ -117,7 +117,7 @@ fn differs_around(buffer: &BuzzBuffer, pixel: usize) -> bool {
     // Nearly every pixel ends here, so three to a row.
     let differs = |middle: usize| {
         let three = &buffer.lit[(middle - 1) * words..(middle + 2) * words];
-        three.chunks_exact(words).any(|bits| bits != own)
+        three.chunks_exact(words).any(|bits| !bits.iter().eq(own))
     };
     [pixel - width, pixel, pixel + width].into_iter().any(differs)
 }

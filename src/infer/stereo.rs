@@ -8,7 +8,7 @@
 //! in a gap stays if it is nearer than anything that was hidden could be there.
 
 use super::Marks;
-use super::buzz_buffer::{BuzzBuffer, Projector};
+use super::buzz_buffer::{BuzzBuffer, Projected, Projector};
 use super::obscured::DEPTH_STEP;
 use super::project::Landings;
 use crate::frame::PixelClass;
@@ -61,10 +61,11 @@ pub fn other_eye(left: &BuzzBuffer, parallax: &Parallax, landings: &Landings, ma
             let z = left.z[i];
             nearest = nearest.min(z);
             let column = parallax.column(left, i, z);
-            if let Some(pixel) = parallax.right.pixel(column, y as f32 + 0.5)
+            let at = Projected { x: column, y: y as f32 + 0.5, z };
+            if let Some(pixel) = parallax.right.pixel(at.x, at.y)
                 && (background || parallax.right.faces(left.position[i], left.normal[i].get()))
             {
-                landings.land(pixel, z, i, marks);
+                landings.land(pixel, at, i, marks);
             }
         }
         for i in row.start..row.end - 1 {

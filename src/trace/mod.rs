@@ -21,7 +21,7 @@ mod visibility;
 mod whitted;
 mod world;
 
-use crate::accel::{Accel, Ray, Sides};
+use crate::accel::{Accel, PreparedRay, Ray, Sides};
 use crate::frame::{PackedNormal, RayCounts, SurfaceRef, SurfaceSample};
 use crate::scene::{Pose, Scene, View};
 pub use changes::LightChanges;
@@ -147,22 +147,26 @@ impl<'a> Tracer<'a> {
         y: f64,
         candidates: impl Iterator<Item = SurfaceSample>,
     ) -> Option<SurfaceSample> {
-        let mut ray = eye.ray(self.accel, x, y);
+        let ray = eye.ray(self.accel, x, y);
+        let mut prepared = PreparedRay::new(ray);
         let mut nearest = None;
         for candidate in candidates {
             if candidate.surface.is_background() {
                 return Some(SurfaceSample::background(ray.direction.normalize_or(Vec3::NEG_Z)));
             }
-            let Some(hit) = self.accel.meet(self.scene, &ray, candidate.surface) else { continue };
-            ray.t_max = hit.t;
-            let position = self.accel.surface_point(self.scene, hit.surface);
-            // A triangle looks the same way everywhere, as it was seen before.
-            let outward = self.accel.shape_normal(self.scene, hit.surface);
-            let seen = outward.map(|n| PackedNormal::new(if hit.front { n } else { -n }));
-            let normal = seen.unwrap_or(candidate.normal);
-            nearest = Some(SurfaceSample { position, surface: hit.surface, normal, ..candidate });
+            let Some(hit) = self.accel.meet(self.scene, &prepared, candidate.surface) else {
+                continue;
+            };
+            prepared.end_at(hit.t);
+            nearest = Some((hit, candidate));
         }
-        nearest
+        let (hit, candidate) = nearest?;
+        let position = self.accel.surface_point(self.scene, hit.surface);
+        // A triangle looks the same way everywhere, as it was seen before.
+        let outward = self.accel.shape_normal(self.scene, hit.surface);
+        let seen = outward.map(|n| PackedNormal::new(if hit.front { n } else { -n }));
+        let normal = seen.unwrap_or(candidate.normal);
+        Some(SurfaceSample { position, surface: hit.surface, normal, ..candidate })
     }
 
     /// The triangles that open to the eye between two views; see [`Accel::turned`].
