@@ -1,10 +1,12 @@
 //! `buzz-convert inspect`: what the scene holds, what it requires, what will be ignored.
 
 use super::args::{Format, InspectArgs};
+use super::memory::held_per_pixel;
 use super::{job, say};
 use anyhow::Result;
 use buzz::infer::BuzzBuffer;
 use buzz::scene::{Interpolation, Light, LightKind, Outline, Projection, Requirements, Scene, Target};
+use buzz::sequence::Settings;
 use buzz::trace::{TraceOptions, lit_words};
 use serde_json::{Value, json};
 use std::process::ExitCode;
@@ -16,22 +18,6 @@ pub fn run(args: InspectArgs) -> Result<ExitCode> {
         Format::Text => as_text(&scene),
     })?;
     Ok(ExitCode::SUCCESS)
-}
-
-/// Stages that rendering the scene runs.
-fn stages(needs: &Requirements) -> Vec<&'static str> {
-    let mut stages = vec!["trace", "project", "obscured", "entering", "creeping"];
-    let others = [
-        (needs.moving_objects, "moved"),
-        (needs.changing_lights, "relight"),
-        (needs.soft_lights, "soft-light"),
-        (needs.textures, "texture"),
-        (true, "highlights"),
-        (needs.reflection, "reflection"),
-        (needs.refraction, "refraction"),
-    ];
-    stages.extend(others.into_iter().filter_map(|(needed, name)| needed.then_some(name)));
-    stages
 }
 
 fn as_json(scene: &Scene) -> Value {
@@ -62,7 +48,8 @@ fn as_json(scene: &Scene) -> Value {
         "requires": needs.names(),
         "ignored": ignored.collect::<Vec<_>>(),
         "bytes_per_pixel": bytes_per_pixel(scene),
-        "stages": stages(&needs),
+        "held_bytes_per_pixel": held_bytes_per_pixel(scene),
+        "stages": needs.stages(),
         "fps": [timing.fps.numerator, timing.fps.denominator],
         "frames": [timing.first, timing.last],
         "resolution": timing.resolution,
@@ -93,17 +80,26 @@ fn as_text(scene: &Scene) -> String {
     }
     let names = needs.names();
     let names = if names.is_empty() { "nothing special".into() } else { names.join(", ") };
-    text += &format!("requires: {names}\nstages: {}\n", stages(&needs).join(", "));
-    text += &format!("bytes a pixel: {}\n", bytes_per_pixel(scene));
+    text += &format!("requires: {names}\nstages: {}\n", needs.stages().join(", "));
+    text += &format!(
+        "bytes a pixel: {} in a Buzzbuffer, {} in all while frames are inferred\n",
+        bytes_per_pixel(scene),
+        held_bytes_per_pixel(scene)
+    );
     for ignored in &scene.ignored {
         text += &format!("ignored: {} at {}: {}\n", ignored.feature, ignored.place, ignored.effect);
     }
     text
 }
 
-/// As it is rendered by default; several shadow rays a light take more.
+/// As it is rendered by default; several shadow rays a light and rays to the world take more.
 fn bytes_per_pixel(scene: &Scene) -> usize {
     BuzzBuffer::bytes_per_pixel(lit_words(scene, TraceOptions::default()))
+}
+
+fn held_bytes_per_pixel(scene: &Scene) -> usize {
+    // Any size will do: it is said for one pixel.
+    held_per_pixel(scene, &Settings::new(1, 1))
 }
 
 fn light_kind(light: &Light) -> &'static str {

@@ -5,8 +5,8 @@ use anyhow::Result;
 use buzz::error::Error;
 use buzz::infer::{BuzzBuffer, Inference};
 use buzz::output::{ExrSink, peak_bytes};
-use buzz::scene::Requirements;
-use buzz::sequence::render_buffers;
+use buzz::scene::{Requirements, Scene};
+use buzz::sequence::{Quality, Settings, render_buffers};
 use buzz::trace::lit_words;
 
 /// Stacks, and what each thread encodes at a time.
@@ -38,12 +38,18 @@ pub fn refuse_over(limit: u64, job: &Job) -> Result<()> {
 fn rendering(job: &Job) -> u64 {
     let (settings, scene) = (&job.settings, &job.scene);
     let lights = scene.lights.len();
-    let words = lit_words(scene, settings.trace_options());
-    let moves = Requirements::of(scene).moving_objects;
-    let inference = render_buffers(settings) * BuzzBuffer::bytes_per_pixel(words)
-        + Inference::bytes_per_pixel(words, moves);
+    let inference = held_per_pixel(scene, settings);
     // One frame is filled while others are encoded; a file is at most as large as the layers that it is made of.
     let frame = settings.aovs.bytes_per_pixel(lights);
     let frames = (ExrSink::IN_FLIGHT + 1) * frame + ExrSink::IN_FLIGHT * frame;
     (settings.window.pixels() * (inference + frames)) as u64 + job.threads as u64 * BYTES_PER_THREAD
+}
+
+/// Bytes that samples and inference take for each pixel of the window, frames and files apart.
+pub fn held_per_pixel(scene: &Scene, settings: &Settings) -> usize {
+    let words = lit_words(scene, settings.trace_options());
+    let infers = settings.quality != Quality::Full;
+    let moves = Requirements::of(scene).moving_objects;
+    let inference = if infers { Inference::bytes_per_pixel(words, moves) } else { 0 };
+    render_buffers(settings, infers) * BuzzBuffer::bytes_per_pixel(words) + inference
 }

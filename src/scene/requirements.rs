@@ -18,6 +18,8 @@ pub struct Requirements {
     pub analytic_shapes: bool,
     /// Nodes other than cameras and lights move, are deformed, appear or vanish.
     pub moving_objects: bool,
+    /// There are lights, so there are shadows.
+    pub lights: bool,
     /// Lights have a size: their shadows are soft.
     pub soft_lights: bool,
     /// The world shines on everything.
@@ -45,6 +47,7 @@ impl Requirements {
             needs.refraction |= material.transmission > 0.0 || material.alpha_mode == AlphaMode::Blend;
         }
         needs.analytic_shapes = scene.shape_count() > 0;
+        needs.lights = !scene.lights.is_empty();
         needs.soft_lights = (0..scene.lights.len()).any(|l| scene.light_has_size(l));
         needs.ambient_light = scene.world.color != Vec3::ZERO;
         let moved = scene.moved_nodes();
@@ -69,6 +72,36 @@ impl Requirements {
         needs
     }
 
+    /// True if frames may differ in more than the camera.
+    pub fn motion(&self) -> bool {
+        self.moving_objects || self.changing_lights
+    }
+
+    /// Stages that a frame goes through in the quality `centred`, in order; `docs/algorithm.md` and `docs/shading.md` say
+    /// what each does.
+    pub fn stages(&self) -> Vec<&'static str> {
+        let all = [
+            (true, "trace"),
+            (self.lights, "shadow"),
+            (self.moving_objects, "ride"),
+            (true, "project"),
+            (true, "obscured"),
+            (true, "turned"),
+            (true, "entering"),
+            (self.moving_objects, "moved"),
+            (true, "centre"),
+            (self.motion() && self.lights, "relight"),
+            (self.lights, "shadow-edges"),
+            (self.textures, "texture"),
+            (self.lights, "diffuse"),
+            (self.lights, "highlights"),
+            (self.ambient_light, "skylight"),
+            (self.reflection, "reflection"),
+            (self.refraction, "refraction"),
+        ];
+        required(&all)
+    }
+
     /// Names of what is required, for reports.
     pub fn names(&self) -> Vec<&'static str> {
         let all = [
@@ -77,14 +110,19 @@ impl Requirements {
             (self.reflection, "reflection"),
             (self.refraction, "refraction"),
             (self.analytic_shapes, "analytic-shapes"),
+            (self.lights, "lights"),
             (self.soft_lights, "soft-lights"),
             (self.ambient_light, "ambient-light"),
             (self.moving_objects, "moving-objects"),
             (self.changing_lights, "changing-lights"),
             (self.lens_change, "lens-change"),
         ];
-        all.into_iter().filter_map(|(needed, name)| needed.then_some(name)).collect()
+        required(&all)
     }
+}
+
+fn required(all: &[(bool, &'static str)]) -> Vec<&'static str> {
+    all.iter().filter_map(|&(needed, name)| needed.then_some(name)).collect()
 }
 
 impl Scene {

@@ -18,7 +18,7 @@ use crate::frame::{
 };
 use crate::infer::{BuzzBuffer, Inference, Move, Projector, Trust};
 use crate::plan::{Plan, Segment};
-use crate::scene::{Pose, Scene, Stereo, View};
+use crate::scene::{Pose, Requirements, Scene, Stereo, View};
 use crate::trace::{TraceOptions, Tracer, lit_words};
 use caster::{Caster, mix};
 use glam::DVec3;
@@ -166,10 +166,11 @@ pub fn render_sequence(
     Ok(())
 }
 
-/// How many [`BuzzBuffer`]s [`render_sequence`] holds: the key frame's, the neighbour's and the frame's own, and the right
-/// eye's in stereo.
-pub fn render_buffers(settings: &Settings) -> usize {
-    if settings.stereo.is_some() { 4 } else { 3 }
+/// How many [`BuzzBuffer`]s [`render_sequence`] holds: the key frame's; if other frames are inferred from it, the
+/// neighbour's and the frame's own; and the right eye's in stereo.
+pub fn render_buffers(settings: &Settings, infers: bool) -> usize {
+    let carried = if infers { 3 } else { 1 };
+    carried + usize::from(settings.stereo.is_some())
 }
 
 /// What inference needs between frames; swapped, never made anew.
@@ -184,10 +185,12 @@ struct Buffers {
 }
 
 impl Buffers {
-    fn fit(&mut self, settings: &Settings, lit_words: usize) {
+    /// Makes room for the buffers that [`render_buffers`] counts.
+    fn fit(&mut self, settings: &Settings, infers: bool, lit_words: usize) {
         let (width, height) = (settings.window.width as usize, settings.window.height as usize);
-        let all = [&mut self.key, &mut self.old, &mut self.new, &mut self.right];
-        for buffer in all.into_iter().take(render_buffers(settings)) {
+        let right = settings.stereo.map(|_| &mut self.right);
+        let carried = [&mut self.key, &mut self.old, &mut self.new];
+        for buffer in right.into_iter().chain(carried).take(render_buffers(settings, infers)) {
             if (buffer.width(), buffer.height(), buffer.lit_words()) != (width, height, lit_words) {
                 *buffer = BuzzBuffer::new(width, height, lit_words);
             }
@@ -209,7 +212,8 @@ fn render_segment(
 ) -> Result<()> {
     let key_shot = shot(scene, settings, segment.key);
     let origin = key_shot.view.eye;
-    buffers.fit(settings, lit_words(scene, settings.trace_options()));
+    let infers = segment.first < segment.last;
+    buffers.fit(settings, infers, lit_words(scene, settings.trace_options()));
     let names = settings.aovs.contains(Aov::Crypto).then(|| MatteNames::of(scene));
     let mut emitter = Emitter { scene, settings, segment, origin, cuts, wanted, names, sink, observer };
     let Buffers { key, old, new, right, inference } = buffers;
@@ -223,18 +227,23 @@ fn render_segment(
     // Outward, as far as a wanted frame lies.
     let before = wanted.first().copied().unwrap_or(segment.key)..segment.key;
     let after = segment.key + 1..=wanted.last().copied().unwrap_or(segment.key);
+    let needs = Requirements::of(scene);
     let mut placed = key_shot.pose;
     for frames in [before.rev().collect::<Vec<_>>(), after.collect()] {
         let mut from = shot(scene, settings, segment.key);
         for (i, &number) in frames.iter().enumerate() {
             let to = shot(scene, settings, number);
             let source = if i == 0 { &*key } else { &*old };
-            if !scene.surfaces_alike(&placed, &to.pose) {
+            if needs.moving_objects && !scene.surfaces_alike(&placed, &to.pose) {
                 accel.place(scene, &to.pose, origin);
                 placed.clone_from(&to.pose);
             }
             let tracer = Tracer::new(scene, accel, &to.pose, settings.trace_options());
-            let motion = SceneMotion::between(scene, accel, &tracer, (&from.pose, &to.pose), &to.view);
+            let poses = (&from.pose, &to.pose);
+            let motion = needs
+                .motion()
+                .then(|| SceneMotion::between(scene, accel, &tracer, poses, &to.view))
+                .flatten();
             let caster = emitter.caster(&tracer, &to, motion.as_ref());
             let stats = emitter.infer(Move::Camera, (source, &from), (new, &to), &caster, inference);
             emitter.emit((accel, &tracer), &to, new, stats)?;
@@ -402,5 +411,26 @@ impl Emitter<'_> {
             let moved = !self.scene.surfaces_alike(&shot.pose, &o.pose);
             Neighbour { view: o.view, surfaces: moved.then(|| accel.displaced(self.scene, &o.pose)) }
         })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn as_many_buffers_are_made_as_are_counted() {
+        let mut settings = Settings::new(3, 2);
+        for stereo in [None, Some(Stereo { interocular: 0.1, convergence: 2.0 })] {
+            settings.stereo = stereo;
+            for infers in [false, true] {
+                let mut buffers = Buffers::default();
+                buffers.fit(&settings, infers, 1);
+                let Buffers { key, old, new, right, .. } = &buffers;
+                let made = [key, old, new, right].into_iter().filter(|b| b.width() > 0).count();
+                assert_eq!(made, render_buffers(&settings, infers));
+                assert_eq!((key.width(), right.width() > 0), (3, stereo.is_some()));
+            }
+        }
     }
 }

@@ -6,6 +6,7 @@ mod determinism;
 mod farm;
 #[cfg(unix)]
 mod faults;
+mod inspect;
 mod layers;
 mod motion;
 mod options;

@@ -183,7 +183,7 @@ fn an_inspection_is_json_on_request() {
     let text = buzz(["inspect", courtyard.to_str().unwrap(), "--format", "json"]).ok().out;
     let scene: serde_json::Value = serde_json::from_str(&text).unwrap();
     assert_eq!(scene["schema"], "buzz-scene/1");
-    for key in "triangles shapes instances cameras lights animations requires ignored bytes_per_pixel stages"
+    for key in "triangles shapes instances cameras lights animations requires ignored bytes_per_pixel held_bytes_per_pixel stages"
         .split(' ')
     {
         assert!(scene.get(key).is_some(), "{key}");

@@ -90,7 +90,7 @@ fn an_inspection_names_sizes_of_lights() {
     let path = stage.write(&folder.path().join("s.gltf"));
     let text = buzz(["inspect", path.to_str().unwrap()]).ok().out;
     assert!(text.contains("light: Lamp (ellipse 2 x 1)"), "{text}");
-    assert!(text.contains("requires: soft-lights, ambient-light"), "{text}");
+    assert!(text.contains("requires: lights, soft-lights, ambient-light"), "{text}");
     let text = buzz(["inspect", path.to_str().unwrap(), "--format", "json"]).ok().out;
     let scene: Value = serde_json::from_str(&text).unwrap();
     assert_eq!(scene["lights"], json!([{"name": "Lamp", "type": "ellipse", "size": [2.0, 1.0]}]));

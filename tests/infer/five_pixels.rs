@@ -179,3 +179,19 @@ fn a_surface_that_turns_away_is_not_reused() {
     let (new, _) = infer(&row, &five(0.0), &five(1.6));
     assert!(!new.class.iter().zip(0..).any(|(c, i)| c.is_reused() && new.sample(i) == row[3]));
 }
+
+#[test]
+fn a_buffer_takes_the_bytes_that_it_states() {
+    for words in 0..4 {
+        let buffer = BuzzBuffer::new(7, 5, words);
+        let BuzzBuffer { z, position, object, surface, normal, lit, class, .. } = &buffer;
+        let held = size_of_val(&z[..])
+            + size_of_val(&position[..])
+            + size_of_val(&object[..])
+            + size_of_val(&surface[..])
+            + size_of_val(&normal[..])
+            + size_of_val(&lit[..])
+            + size_of_val(&class[..]);
+        assert_eq!(held, 7 * 5 * BuzzBuffer::bytes_per_pixel(words));
+    }
+}

@@ -1,0 +1,60 @@
+//! What `inspect` says that a scene requires, and that what it does not require is neither run nor stored.
+
+use crate::rig::{buzz, fresh};
+use crate::stage::{CARD, LAMP, Stage};
+use serde_json::Value;
+
+fn inspect(stage: &Stage) -> Value {
+    let (folder, _) = fresh();
+    let path = stage.write(&folder.path().join("s.gltf"));
+    serde_json::from_str(&buzz(["inspect", path.to_str().unwrap(), "--format", "json"]).ok().out).unwrap()
+}
+
+fn names(scene: &Value, key: &str) -> Vec<String> {
+    scene[key].as_array().unwrap().iter().map(|name| name.as_str().unwrap().into()).collect()
+}
+
+/// What `more` has under a key that `less` has not.
+fn added(more: &Value, less: &Value, key: &str) -> Vec<String> {
+    let less = names(less, key);
+    names(more, key).into_iter().filter(|name| !less.contains(name)).collect()
+}
+
+fn bytes(scene: &Value, key: &str) -> u64 {
+    scene[key].as_u64().unwrap()
+}
+
+#[test]
+fn a_light_asks_for_shadow_bits() {
+    let lit = inspect(&Stage::new());
+    let mut dark = Stage::new();
+    dark.json.as_object_mut().unwrap().remove("extensions");
+    dark.json["nodes"][LAMP].as_object_mut().unwrap().remove("extensions");
+    let dark = inspect(&dark);
+    assert_eq!(added(&lit, &dark, "requires"), ["lights"]);
+    assert_eq!(added(&lit, &dark, "stages"), ["shadow", "shadow-edges", "diffuse", "highlights"]);
+    assert_eq!(bytes(&lit, "bytes_per_pixel"), bytes(&dark, "bytes_per_pixel") + 4);
+}
+
+#[test]
+fn moving_objects_ask_for_a_copy_of_the_samples() {
+    let still = inspect(&Stage::new());
+    let mut moving = Stage::new();
+    moving.translate(CARD, &[[0.0; 3], [1.0, 0.0, 0.0]]);
+    let moving = inspect(&moving);
+    assert_eq!(added(&moving, &still, "requires"), ["moving-objects"]);
+    assert_eq!(added(&moving, &still, "stages"), ["ride", "moved", "relight"]);
+    let held = |scene| bytes(scene, "held_bytes_per_pixel");
+    assert_eq!(held(&moving), held(&still) + bytes(&moving, "bytes_per_pixel"));
+}
+
+#[test]
+fn lights_that_change_ask_for_no_copy() {
+    let still = inspect(&Stage::new());
+    let mut dimmed = Stage::new();
+    dimmed.change("/extensions/KHR_lights_punctual/lights/0/intensity", &[60000.0, 100.0]);
+    let dimmed = inspect(&dimmed);
+    assert_eq!(added(&dimmed, &still, "requires"), ["changing-lights"]);
+    assert_eq!(added(&dimmed, &still, "stages"), ["relight"]);
+    assert_eq!(bytes(&dimmed, "held_bytes_per_pixel"), bytes(&still, "held_bytes_per_pixel"));
+}
