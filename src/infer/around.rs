@@ -159,28 +159,24 @@ impl<'a> Around<'a> {
         }
     }
 
-    /// Takes over into `lit` the bits on which enough samples around that lie on the surface of `sample` agree. Sets in
-    /// `ask` those of all other lights.
+    /// Takes over into `lit` the bits on which enough samples around that lie on the surface of `sample` agree, and the mean
+    /// of their shares. Sets in `ask` those of all other lights. What is not `certain` asks all, and at least to be confirmed.
     pub fn lend(
         &self,
         sample: &SurfaceSample,
         rays: &impl CastCentres,
-        trust: Trust,
+        (trust, certain): (Trust, bool),
         lit: &mut [u32],
         ask: &mut [u32],
     ) {
-        let normal = sample.normal.get();
-        let lenders = self.known().filter(|&k| {
-            let lender = self.old.sample(k);
-            normal.dot(lender.normal.get()) > SAME_FACING && is_one_surface(sample, &lender, self.view)
-        });
+        let lenders = self.known().filter(|&k| may_lend(sample, &self.old.sample(k), self.view));
+        let Some(first) = lenders.clone().next() else { return ask.fill(u32::MAX) };
+        differing(rays, self.old, lenders.clone(), ask);
+        lit.copy_from_slice(self.old.lit(first));
+        rays.blend(lenders.clone().map(|k| (self.old.lit(k), 1.0)), lit);
         let enough = if trust == Trust::Proof { self.size } else { ENOUGH_TO_LEND };
-        match lenders.clone().next() {
-            Some(first) if lenders.clone().count() >= enough => {
-                differing(rays, self.old, lenders, ask);
-                lit.copy_from_slice(self.old.lit(first));
-            }
-            _ => ask.fill(u32::MAX),
+        if !certain || lenders.count() < enough {
+            rays.confirm(ask);
         }
     }
 }
@@ -207,6 +203,11 @@ fn is_at_centre(old: &BuzzBuffer, i: usize, view: &Projector, x: usize, y: usize
 fn is_same_primitive(old: &BuzzBuffer, a: usize, b: usize) -> bool {
     let (a, b) = (&old.surface[a], &old.surface[b]);
     (a.instance, a.primitive) == (b.instance, b.primitive)
+}
+
+/// True where two samples lie on one surface and face the same way: what light reaches one is likely to reach the other.
+pub(super) fn may_lend(a: &SurfaceSample, b: &SurfaceSample, view: &Projector) -> bool {
+    a.normal.get().dot(b.normal.get()) > SAME_FACING && is_one_surface(a, b, view)
 }
 
 /// True where two samples lie on one surface, with no step between them.
