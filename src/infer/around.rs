@@ -126,33 +126,26 @@ impl<'a> Around<'a> {
         }
     }
 
-    /// Takes over into `lit` the bits on which enough samples around that lie on the surface of `sample` agree. Sets in
-    /// `ask` those of all other lights.
+    /// Takes over into `lit` the bits on which enough samples around that lie on the surface of `sample` agree, and the mean
+    /// of their shares. Sets in `ask` those of all other lights. What is not `certain` asks all, and at least to be confirmed.
     pub fn lend(
         &self,
         sample: &SurfaceSample,
         rays: &impl CastCentres,
-        trust: Trust,
+        (trust, certain): (Trust, bool),
         lit: &mut [u32],
         ask: &mut [u32],
     ) {
         let tangent = Tangent::new(*sample, self.view);
         let mut lenders = Nearby::NONE;
-        for k in self.known() {
-            let lender = self.old.sample(k);
-            let faces_alike =
-                lender.normal == sample.normal || tangent.normal.dot(lender.normal.get()) > SAME_FACING;
-            if faces_alike && tangent.reaches(&lender) {
-                lenders.push(k);
-            }
-        }
+        self.known().filter(|&k| tangent.may_lend(&self.old.sample(k))).for_each(|k| lenders.push(k));
+        let Some(first) = lenders.iter().next() else { return ask.fill(u32::MAX) };
+        differing(rays, self.old, &lenders, ask);
+        lit.copy_from_slice(self.old.lit(first));
+        rays.blend(lenders.iter().map(|k| (self.old.lit(k), 1.0)), lit);
         let enough = if trust == Trust::Proof { self.size } else { ENOUGH_TO_LEND };
-        match lenders.iter().next() {
-            Some(first) if lenders.count >= enough => {
-                differing(rays, self.old, &lenders, ask);
-                lit.copy_from_slice(self.old.lit(first));
-            }
-            _ => ask.fill(u32::MAX),
+        if !certain || lenders.count < enough {
+            rays.confirm(ask);
         }
     }
 }
@@ -167,7 +160,7 @@ fn differing(rays: &impl CastCentres, old: &BuzzBuffer, samples: &Nearby, differ
 }
 
 /// A sample's tangent plane, to hold many samples against it.
-struct Tangent<'a> {
+pub(super) struct Tangent<'a> {
     sample: SurfaceSample,
     normal: Vec3,
     /// How far off the plane the same surface may be as far as this sample's own pixel goes, metres.
@@ -176,9 +169,15 @@ struct Tangent<'a> {
 }
 
 impl<'a> Tangent<'a> {
-    fn new(sample: SurfaceSample, view: &'a Projector) -> Self {
+    pub fn new(sample: SurfaceSample, view: &'a Projector) -> Self {
         let step = STEP * view.pixel_width(sample.position);
         Self { sample, normal: sample.normal.get(), step, view }
+    }
+
+    /// True if `other` lies on the same surface and faces the same way: what light reaches one is likely to reach the other.
+    pub fn may_lend(&self, other: &SurfaceSample) -> bool {
+        let faces_alike = || self.normal.dot(other.normal.get()) > SAME_FACING;
+        (other.normal == self.sample.normal || faces_alike()) && self.reaches(other)
     }
 
     /// See [`is_one_surface`].

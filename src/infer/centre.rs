@@ -12,7 +12,8 @@
 //!
 //! Shadow bits are settled light by light. The points around say whether a light reaches the surface here: where they
 //! agree they are believed; where they do not, the shadow's edge is near and a ray is cast to that light alone. The bits
-//! around a wrong bit disagree with it, so an error does not live on.
+//! around a wrong bit disagree with it, so an error does not live on. Shares of lights that have a size are carried along
+//! with the surface ([`carry`]); where they change fast from point to point, a few rays renew them.
 
 use super::Marks;
 use super::around::{Around, Trust, is_one_surface};
@@ -20,6 +21,7 @@ use super::buzz_buffer::{BuzzBuffer, CastRays, Projector, Row, UNKNOWN};
 use super::moved::Askers;
 use super::project::Landings;
 use super::shadow_edges::ShadowEdges;
+use super::shares::carry;
 use super::sources::{Alike, Sources};
 use crate::frame::{PixelClass, RayCounts, SurfaceSample};
 use rayon::prelude::*;
@@ -29,7 +31,8 @@ pub trait CastCentres: CastRays {
     /// The sample that the ray through the centre of pixel (x, y) finds; no light is asked for.
     fn hit(&self, x: usize, y: usize, counts: &mut RayCounts) -> SurfaceSample;
 
-    /// Finds out which of the lights named by the bits of `ask` reach the sample, and changes their bits in `lit`.
+    /// Finds out which of the lights named by the bits of `ask` reach the sample, and changes their bits in `lit`. Where `ask`
+    /// has bits of [`CastCentres::confirm`] only, the shares in `lit` are believed unless a few rays speak against them.
     fn recast(&self, sample: &SurfaceSample, ask: &[u32], lit: &mut [u32], counts: &mut RayCounts);
 
     /// Sets in `differ` bits of the lights on which two samples disagree: all bits in which they differ, unless some of
@@ -38,6 +41,31 @@ pub trait CastCentres: CastRays {
         for ((differ, a), b) in differ.iter_mut().zip(a).zip(b) {
             *differ |= a ^ b;
         }
+    }
+
+    /// Whether any of a sample's bits are numbers: shares of light.
+    fn has_shares(&self) -> bool {
+        false
+    }
+
+    /// Sets in `ask` what asks all lights for their bits, and shares only to be confirmed.
+    fn confirm(&self, ask: &mut [u32]) {
+        ask.fill(u32::MAX);
+    }
+
+    /// Makes of all that `ask` asks of shares to confirm them.
+    fn soften(&self, ask: &mut [u32]) {
+        let _ = ask;
+    }
+
+    /// Clears in `ask` what asks for shares only to be confirmed: there is no edge of a shadow.
+    fn keep_edges(&self, ask: &mut [u32]) {
+        let _ = ask;
+    }
+
+    /// Sets the shares in `lit` to the mean of those that are `known`, each with its weight.
+    fn blend<'a>(&self, known: impl Iterator<Item = (&'a [u32], f32)> + Clone, lit: &mut [u32]) {
+        let _ = (known, lit);
     }
 
     /// What the ray through the centre of pixel (x, y) meets first of the triangles that `candidates` lie on. Where these
@@ -149,6 +177,10 @@ impl Centring {
                         let wide = || Around::new(old, view, sources, (x, y), 2);
                         let around = if around.is_complete() { around } else { wide() };
                         around.disagreement(rays, trust, ask);
+                        if rays.has_shares() {
+                            rays.soften(ask);
+                            carry((old, i), view, (x, y), &sample, rays, (row.lit_mut(x), ask));
+                        }
                     }
                 }
                 row.class[x] = match (own, centred) {
@@ -181,10 +213,16 @@ impl Centring {
             for x in 0..width {
                 let (pixel, ask) = (y * width + x, &mut ask[x * words..][..words]);
                 let known = row.object[x] != UNKNOWN;
-                let looks = trust == Trust::Proof || (moves && is_lookout(x, y));
-                if known && looks && rays.is_hidden(&row.sample(x), &mut counts) {
+                let is_lookout = moves && is_lookout(x, y);
+                if known
+                    && (is_lookout || trust == Trust::Proof)
+                    && rays.is_hidden(&row.sample(x), &mut counts)
+                {
                     row.class[x] = PixelClass::Bad;
                     row.object[x] = UNKNOWN;
+                }
+                if is_lookout && rays.has_shares() {
+                    rays.confirm(ask);
                 }
                 if row.object[x] == UNKNOWN {
                     let sample = rays.hit(x, y, &mut counts);
@@ -192,9 +230,15 @@ impl Centring {
                     row.lit_mut(x).fill(0);
                     ask.fill(u32::MAX);
                     let own = sources.of(pixel);
-                    if own.is_some_and(|i| is_one_surface(&sample, &old.sample(i), view)) {
+                    let certain = own.filter(|&i| is_one_surface(&sample, &old.sample(i), view));
+                    if certain.is_some() || rays.has_shares() {
                         let around = Around::new(old, view, sources, (x, y), 2);
-                        around.lend(&sample, rays, trust, row.lit_mut(x), ask);
+                        around.lend(&sample, rays, (trust, certain.is_some()), row.lit_mut(x), ask);
+                        if let Some(i) = certain
+                            && rays.has_shares()
+                        {
+                            carry((old, i), view, (x, y), &sample, rays, (row.lit_mut(x), ask));
+                        }
                     }
                 }
                 // Its lights were asked when it was cast, or since.

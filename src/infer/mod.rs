@@ -28,6 +28,7 @@ mod moved;
 mod obscured;
 mod project;
 mod shadow_edges;
+mod shares;
 mod sources;
 mod stereo;
 mod turned;

@@ -78,6 +78,7 @@ impl ShadowEdges {
                     rays.differ(lit, buffer.lit(other), ask);
                 }
             }
+            rays.keep_edges(ask);
             ask.iter_mut().zip(&asked[i * words..]).for_each(|(ask, asked)| *ask &= !asked);
             let mut counts = RayCounts::default();
             rays.recast(&sample, ask, lit, &mut counts);

@@ -56,6 +56,26 @@ impl CastCentres for Caster<'_> {
         self.tracer.differ(a, b, differ);
     }
 
+    fn has_shares(&self) -> bool {
+        self.tracer.has_shares()
+    }
+
+    fn confirm(&self, ask: &mut [u32]) {
+        self.tracer.confirm(ask);
+    }
+
+    fn soften(&self, ask: &mut [u32]) {
+        self.tracer.soften(ask);
+    }
+
+    fn keep_edges(&self, ask: &mut [u32]) {
+        self.tracer.keep_edges(ask);
+    }
+
+    fn blend<'a>(&self, known: impl Iterator<Item = (&'a [u32], f32)> + Clone, lit: &mut [u32]) {
+        self.tracer.blend(known, lit);
+    }
+
     fn nearest_of(
         &self,
         x: usize,

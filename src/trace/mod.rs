@@ -32,7 +32,7 @@ use light::Emitter;
 use point::{Side, SurfacePoint};
 use std::f32::consts::FRAC_1_PI;
 use surface::{Surface, occlusion};
-use visibility::{Field, Layout};
+use visibility::{Field, Inquiry, Layout};
 use whitted::{Incoming, Path};
 use world::Surroundings;
 
@@ -112,7 +112,7 @@ impl<'a> Tracer<'a> {
         lit.fill(0);
         let (sample, point) = self.first_hit(eye, x, y, rays);
         if let Some(point) = point {
-            self.look_for_lights(&point, |_| true, lit, rays);
+            self.look_for_lights(&point, |_, _| Some(Inquiry::Part(1.0)), lit, rays);
         }
         sample
     }
@@ -122,20 +122,46 @@ impl<'a> Tracer<'a> {
         self.first_hit(eye, x, y, rays).0
     }
 
-    /// Finds out anew whether the lights of which any bit is set in `ask` reach a sample, and sets or clears their bits
-    /// in `lit`. Counts `shadow` and `ambient`.
+    /// Finds out anew whether the lights of which any bit is set in `ask` reach a sample, and changes their bits in `lit`.
+    /// A share of which not the highest bit is set is believed, and renewed by a few rays unless they speak against it.
+    /// Counts `shadow` and `ambient`.
     pub fn recast(&self, sample: &SurfaceSample, ask: &[u32], lit: &mut [u32], rays: &mut RayCounts) {
         if !sample.surface.is_background() {
             let side = Side::Towards(sample.normal.get());
             let point = SurfacePoint::new(self.scene, self.accel, sample.surface, side);
-            self.look_for_lights(&point, |field| field.is_set(ask), lit, rays);
+            self.look_for_lights(&point, |field, lit| field.inquiry(ask, lit), lit, rays);
         }
     }
 
-    /// Sets in `differ` bits of the lights on which the shadow bits of two samples disagree. Shares that came out
-    /// differently by chance agree.
+    /// Sets in `differ` bits of the lights on which the shadow bits of two samples disagree, as [`Tracer::recast`] takes
+    /// them. Shares that came out differently by chance agree; those that are not far apart are to be confirmed.
     pub fn differ(&self, a: &[u32], b: &[u32], differ: &mut [u32]) {
         self.layout.differ(a, b, differ);
+    }
+
+    /// Whether samples have shares of any light, not only bits.
+    pub fn has_shares(&self) -> bool {
+        self.layout.has_shares()
+    }
+
+    /// Sets in `ask` the bits by which [`Tracer::recast`] confirms all shares and finds all else anew.
+    pub fn confirm(&self, ask: &mut [u32]) {
+        self.layout.confirm(ask);
+    }
+
+    /// Makes of all that `ask` asks of shares to confirm them.
+    pub fn soften(&self, ask: &mut [u32]) {
+        self.layout.soften(ask);
+    }
+
+    /// Clears in `ask` the bits by which shares are only to be confirmed.
+    pub fn keep_edges(&self, ask: &mut [u32]) {
+        self.layout.keep_edges(ask);
+    }
+
+    /// Sets the shares in `lit` to the weighted mean of those that are `known`; single bits stay.
+    pub fn blend<'b>(&self, known: impl Iterator<Item = (&'b [u32], f32)> + Clone, lit: &mut [u32]) {
+        self.layout.blend(known, lit);
     }
 
     /// What the ray through raster position (x, y) meets first if it can meet nothing but the triangles and shapes
@@ -206,21 +232,26 @@ impl<'a> Tracer<'a> {
         }
     }
 
-    /// Casts rays to each light that is `asked` for and could shine on the point, and to the world.
+    /// Casts rays to each light about which there is an `inquiry`, given what is believed, and that could shine on the
+    /// point, and to the world.
     fn look_for_lights(
         &self,
         point: &SurfacePoint,
-        asked: impl Fn(Field) -> bool,
+        inquiry: impl Fn(Field, &[u32]) -> Option<Inquiry>,
         lit: &mut [u32],
         rays: &mut RayCounts,
     ) {
         let looks = !point.material.unlit;
-        for (number, &field) in self.layout.lights.iter().enumerate().filter(|(_, field)| asked(**field)) {
-            let share = if looks { self.light_share(point, number, || rays.shadow += 1) } else { 0.0 };
+        for (number, &field) in self.layout.lights.iter().enumerate() {
+            let Some(inquiry) = inquiry(field, lit) else { continue };
+            let share =
+                if looks { self.light_share(point, number, inquiry, || rays.shadow += 1) } else { 0.0 };
             field.set(lit, share);
         }
-        if let Some(field) = self.layout.ambient.filter(|field| asked(*field)) {
-            let share = if looks { self.world_share(point, || rays.ambient += 1) } else { 0.0 };
+        if let Some(field) = self.layout.ambient
+            && let Some(inquiry) = inquiry(field, lit)
+        {
+            let share = if looks { self.world_share(point, inquiry, || rays.ambient += 1) } else { 0.0 };
             field.set(lit, share);
         }
     }

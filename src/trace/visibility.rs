@@ -18,10 +18,26 @@ pub(super) struct Layout {
     shares: Vec<(Field, f32)>,
     /// For each word, the bits that are none of a share's.
     single_bits: Vec<u32>,
+    /// For each word, those and the lowest bit of each share: what asks to confirm shares, and for all else.
+    confirming: Vec<u32>,
 }
 
+/// How the share of a light that reaches a point is to be found.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) enum Inquiry {
+    /// By this part of all rays.
+    Part(f32),
+    /// By all rays, if a few do not settle it.
+    Anew,
+    /// This share is believed, unless a few rays speak against it.
+    Confirm(f32),
+}
+
+/// Shares that are farther apart are on two sides of an edge, and say nothing about what is between them.
+const EDGE: f32 = 0.5;
+
 /// One light's bits, all in one word.
-#[derive(Debug, Clone, Copy, Default)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub(super) struct Field {
     word: usize,
     shift: usize,
@@ -52,17 +68,59 @@ impl Layout {
         for (field, _) in &shares {
             single_bits[field.word] &= !(field.whole << field.shift);
         }
-        Self { lights, ambient, words, shares, single_bits }
+        let mut confirming = single_bits.clone();
+        for (field, _) in &shares {
+            confirming[field.word] |= 1 << field.shift;
+        }
+        Self { lights, ambient, words, shares, single_bits, confirming }
     }
 
-    /// Sets in `differ` bits of the fields in which `a` and `b` do not mean the same.
+    /// Whether any light has a share.
+    pub fn has_shares(&self) -> bool {
+        !self.shares.is_empty()
+    }
+
+    /// Sets in `ask` the bits that ask to confirm shares, and all single bits.
+    pub fn confirm(&self, ask: &mut [u32]) {
+        ask.iter_mut().zip(&self.confirming).for_each(|(ask, bits)| *ask |= bits);
+    }
+
+    /// Makes of all that `ask` asks of shares to confirm them.
+    pub fn soften(&self, ask: &mut [u32]) {
+        ask.iter_mut().zip(&self.confirming).for_each(|(ask, bits)| *ask &= bits);
+    }
+
+    /// Clears in `ask` what asks to confirm shares, and for the world's: it changes from face to face, but throws no shadow.
+    pub fn keep_edges(&self, ask: &mut [u32]) {
+        for &(field, _) in &self.shares {
+            if self.ambient == Some(field) || field.inquiry(ask, ask) != Some(Inquiry::Anew) {
+                ask[field.word] &= !(field.whole << field.shift);
+            }
+        }
+    }
+
+    /// Sets the shares in `lit` to the mean of those in `known`, each with its weight. Single bits stay.
+    pub fn blend<'a>(&self, known: impl Iterator<Item = (&'a [u32], f32)> + Clone, lit: &mut [u32]) {
+        for &(field, _) in &self.shares {
+            let add = |(sum, all), (words, weight)| (sum + weight * field.share(words), all + weight);
+            let (sum, all) = known.clone().fold((0.0, 0.0), add);
+            if all > 0.0 {
+                field.set(lit, sum / all);
+            }
+        }
+    }
+
+    /// Sets in `differ` bits of the fields in which `a` and `b` do not mean the same: the lowest bit of shares that might
+    /// both be right, all bits of shares on two sides of an edge.
     pub fn differ(&self, a: &[u32], b: &[u32], differ: &mut [u32]) {
         for (((differ, a), b), single) in differ.iter_mut().zip(a).zip(b).zip(&self.single_bits) {
             *differ |= (a ^ b) & single;
         }
         for (field, noise) in &self.shares {
-            if (field.share(a) - field.share(b)).abs() > *noise {
-                differ[field.word] |= field.whole << field.shift;
+            let apart = (field.share(a) - field.share(b)).abs();
+            if apart > *noise {
+                let bits = if apart > noise.max(EDGE) { field.whole } else { 1 };
+                differ[field.word] |= bits << field.shift;
             }
         }
     }
@@ -102,6 +160,16 @@ impl Field {
     /// True if it holds a share, not only whether the light arrives.
     pub fn is_share(self) -> bool {
         self.whole > 1
+    }
+
+    /// What `ask` wants to know of it, `lit` being what is believed: nothing where none of its bits are set, all anew where
+    /// the highest is.
+    pub fn inquiry(self, ask: &[u32], lit: &[u32]) -> Option<Inquiry> {
+        match self.bits(ask) {
+            0 => None,
+            bits if bits > self.whole / 2 => Some(Inquiry::Anew),
+            _ => Some(Inquiry::Confirm(self.share(lit))),
+        }
     }
 
     /// Whether any of its bits is set in `words`.
@@ -181,9 +249,46 @@ mod tests {
         };
         assert_eq!(differ(sample(0.0, 0.5), sample(0.0, 0.7)), 0);
         assert_eq!(differ(sample(0.0, 0.5), sample(1.0, 0.7)), 1);
-        assert_eq!(differ(sample(1.0, 0.4), sample(1.0, 0.7)), 0xff00);
+        assert_eq!(differ(sample(1.0, 0.4), sample(1.0, 0.7)), 0x0100);
+        assert_eq!(differ(sample(1.0, 0.2), sample(1.0, 0.8)), 0xff00);
         assert_eq!(differ(sample(0.0, 0.0), sample(1.0, 1.0)), 0xff01);
         assert!(noise(2) < 1.0);
+    }
+
+    #[test]
+    fn some_bits_ask_to_confirm_and_the_highest_asks_anew() {
+        let mut scene = scene(&[0.0, 0.1]);
+        scene.world.color = Vec3::ONE;
+        let options = TraceOptions { light_samples: 16, ambient_samples: 16, ..TraceOptions::default() };
+        let layout = Layout::new(&scene, options);
+        let fields = || layout.lights.iter().copied().chain(layout.ambient);
+        let inquiries = |ask: u32| fields().map(|f| f.inquiry(&[ask], &[u32::MAX])).collect::<Vec<_>>();
+        let (anew, confirm) = (Some(Inquiry::Anew), Some(Inquiry::Confirm(1.0)));
+        assert_eq!(inquiries(0), [None; 3]);
+        assert_eq!(inquiries(u32::MAX), [anew; 3]);
+        let mut ask = [0];
+        layout.confirm(&mut ask);
+        assert_eq!(inquiries(ask[0]), [anew, confirm, confirm]);
+        layout.keep_edges(&mut ask);
+        assert_eq!(inquiries(ask[0]), [anew, None, None]);
+        let mut ask = [u32::MAX];
+        layout.keep_edges(&mut ask);
+        assert_eq!(inquiries(ask[0]), [anew, anew, None]);
+        layout.soften(&mut ask);
+        assert_eq!(inquiries(ask[0]), [anew, confirm, None]);
+    }
+
+    #[test]
+    fn shares_are_blended_and_bits_are_not() {
+        let options = TraceOptions { light_samples: 16, ..TraceOptions::default() };
+        let layout = Layout::new(&scene(&[0.0, 0.1]), options);
+        let known = [([0xff01], 3.0), ([0x0001], 1.0), ([0xff00], 0.0)];
+        let known = || known.iter().map(|(words, weight)| (words.as_slice(), *weight));
+        let mut lit = [0x5500];
+        layout.blend(known(), &mut lit);
+        assert_eq!(lit, [0xbf00]);
+        layout.blend(known().take(0), &mut lit);
+        assert_eq!(lit, [0xbf00]);
     }
 
     #[test]

@@ -5,6 +5,7 @@ use super::interaction::{Beam, SurfaceInteraction};
 use super::light::{Emitter, GRID, Unshadowed};
 use super::point::Side;
 use super::surface::Surface;
+use super::visibility::Inquiry;
 use super::{Radiance, Tracer};
 use crate::accel::{Ray, Sides};
 use crate::frame::RayCounts;
@@ -275,12 +276,14 @@ impl Tracer<'_> {
         let surface = Surface::new(&it);
         let mut incoming = Incoming::default();
         if !it.point.material.unlit {
-            let ambient =
-                self.layout.ambient.map_or(1.0, |_| self.world_share(&it.point, || path.count(rays)));
+            // As few rays as the path brings little to the pixel.
+            let inquiry = Inquiry::Part(path.share.max_element());
+            let openness = |_| self.world_share(&it.point, inquiry, || path.count(rays));
+            let ambient = self.layout.ambient.map_or(1.0, openness);
             incoming = self.skylight(&it, ambient);
             for (number, light) in self.lights.iter().enumerate() {
                 if let Some(unshadowed) = light.unshadowed(it.point.position, it.normal) {
-                    let share = self.light_share(&it.point, number, || path.count(rays));
+                    let share = self.light_share(&it.point, number, inquiry, || path.count(rays));
                     if share > 0.0 {
                         incoming.add(&it, &surface, -direction, light, &unshadowed, share);
                     }

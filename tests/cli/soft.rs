@@ -3,6 +3,7 @@
 use crate::rig::{assert_same_bytes, buzz, channels, frames_in, fresh, json, run};
 use crate::stage::{CAMERA, Stage};
 use serde_json::{Value, json};
+use std::path::PathBuf;
 
 /// The stage under a large lamp and a sky.
 fn softly_lit(mut stage: Stage) -> Stage {
@@ -61,6 +62,53 @@ fn rays_to_lights_and_sky_are_counted_and_saved() {
     assert!(full[0] > 7 * one[0] && full[0] <= 8 * one[0], "{full:?} {one:?}");
     assert!(full[1] >= 4 * one[0]);
     assert!(2 * inferred[0] < full[0] && 2 * inferred[1] < full[1], "{full:?} {inferred:?}");
+}
+
+/// The camera sways over 90 frames, so that most of what it sees stays in view: a chain as long as they get.
+fn swaying() -> Stage {
+    let mut stage = Stage::new();
+    let path: Vec<[f32; 3]> = (0..90).map(|i| [0.4 * (i as f32 / 7.0).sin(), 1.0, 6.0]).collect();
+    stage.translate(CAMERA, &path);
+    softly_lit(stage)
+}
+
+const SIXTEEN: &str = "-r 160x90 --light-samples 16 --ambient-samples 16";
+
+#[test]
+fn soft_light_saves_nine_rays_in_ten() {
+    let (folder, out) = fresh();
+    let scene = swaying().write(&folder.path().join("s.gltf"));
+    run(&scene, &out, SIXTEEN).ok();
+    let report = json(&out.join("report.json"));
+    let rays = |of: &Value| of["rays"]["shadow"].as_f64().unwrap() + of["rays"]["ambient"].as_f64().unwrap();
+    let frames = report["frames"].as_array().unwrap();
+    let key = frames.iter().find(|frame| frame["traced"] == 1.0).unwrap();
+    let (full, inferred) = (rays(key) * frames.len() as f64, rays(&report["totals"]));
+    assert!(inferred < 0.1 * full, "{:.3} of {full} rays", inferred / full);
+}
+
+/// Noise is shared, errors do not grow: against a truth of 256 samples, frames at the end of a chain are as good as traced
+/// ones, and as those near its beginning.
+#[test]
+fn soft_light_stays_true_to_the_end_of_a_chain() {
+    let (folder, _) = fresh();
+    let scene = swaying().write(&folder.path().join("s.gltf"));
+    let render = |name: &str, options: &str| {
+        run(&scene, &folder.path().join(name), &format!("{options} --segment 129 -f 10,50,89")).ok();
+        folder.path().join(name)
+    };
+    let truth = render("truth", "-r 160x90 --light-samples 256 --ambient-samples 256 -q full");
+    let psnr = |of: PathBuf| -> Vec<f64> {
+        let arguments = ["compare", of.to_str().unwrap(), truth.to_str().unwrap(), "--format", "json"];
+        let found: Value = serde_json::from_str(&buzz(arguments).ok().out).unwrap();
+        found["frames"].as_array().unwrap().iter().map(|f| f["psnr_db"].as_f64().unwrap()).collect()
+    };
+    let full = psnr(render("full", &format!("{SIXTEEN} -q full")));
+    let inferred = psnr(render("inferred", SIXTEEN));
+    for (full, inferred) in full.iter().zip(&inferred) {
+        assert!(*inferred > full - 0.5, "{inferred} {full}");
+    }
+    assert!(inferred[2] > inferred[0] - 1.0, "{inferred:?}");
 }
 
 #[test]

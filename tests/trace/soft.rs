@@ -212,11 +212,67 @@ fn a_point_has_the_same_share_whenever_it_is_asked() {
     let mut lit = vec![0; pixel.lit.len()];
     rig.tracer().recast(&pixel.sample, &[u32::MAX], &mut lit, &mut rays);
     assert_eq!((&lit, rays.shadow, rays.ambient), (&pixel.lit, 9, 8));
-    // One of its bits asks for all of a light, and for no other.
+    // The highest of its bits asks for all of a light, and for no other.
     let mut lit = pixel.lit.clone();
     lit[0] = !lit[0];
-    rig.tracer().recast(&pixel.sample, &[1 << 9], &mut lit, &mut rays);
+    rig.tracer().recast(&pixel.sample, &[1 << 15], &mut lit, &mut rays);
     assert_eq!((lit[0] ^ pixel.lit[0], rays.shadow, rays.ambient), (!0xff00, 17, 8));
+}
+
+#[test]
+fn a_share_that_is_believed_takes_few_rays_unless_they_speak_against_it() {
+    let mut scene = floor(matt(Vec3::ONE));
+    add_panel(&mut scene, Outline::Rectangle, [0.75, 1.0, 0.35], [1.5, 0.7]);
+    add_half_screen(&mut scene, 0.6);
+    let rig = soft(scene, 16, 0);
+    let pixel = rig.center();
+    // The share that is found if one is believed, and the rays that it takes.
+    let recast = |believed: u32| {
+        let (mut lit, mut rays) = (vec![believed], Default::default());
+        rig.tracer().recast(&pixel.sample, &[1], &mut lit, &mut rays);
+        (lit[0], rays.shadow)
+    };
+    let (found, rays) = recast(pixel.lit[0]);
+    // Two rays of 16 weigh an eighth.
+    assert_eq!(rays, 2);
+    assert!(found.abs_diff(pixel.lit[0]) <= 256 / 8, "{found} {}", pixel.lit[0]);
+    for wrong in [0, 255] {
+        assert_eq!(recast(wrong), (pixel.lit[0], 16));
+    }
+}
+
+#[test]
+fn a_few_rays_settle_that_all_of_a_light_arrives_or_none_of_it() {
+    for covered in [-3.0, 3.0] {
+        let mut scene = floor(matt(Vec3::ONE));
+        add_panel(&mut scene, Outline::Rectangle, [0.75, 1.0, 0.35], [1.5, 0.7]);
+        add_half_screen(&mut scene, covered);
+        let rig = soft(scene, 32, 0);
+        let pixel = rig.center();
+        let (mut lit, mut rays) = (vec![77], Default::default());
+        rig.tracer().recast(&pixel.sample, &[u32::MAX], &mut lit, &mut rays);
+        assert_eq!((pixel.rays.shadow, lit, rays.shadow), (32, pixel.lit, 8));
+    }
+}
+
+#[test]
+fn what_a_faint_mirror_shows_is_lit_by_fewer_rays() {
+    // A mirror that returns a twenty-fifth, under a white ceiling.
+    let reflected = |samples: u32| {
+        let material = Material { roughness: 0.0, ..Material::dielectric(Vec3::splat(0.5), 0.0) };
+        let mut scene = floor(material);
+        scene.cameras.clear();
+        scene.add_camera(DVec3::new(0.3, 1.0, 0.0), DVec3::ZERO, 0.1);
+        let downwards = DAffine3::from_quat(DQuat::from_rotation_x(2.0 * FRAC_PI_2));
+        add_plane(&mut scene, matt(Vec3::ONE), 5.0, at(0.0, 3.0, 0.0) * downwards);
+        scene.add_light(LightKind::Point, 5.0, at(0.0, 2.0, 0.0));
+        scene.lights[0].size = 0.5;
+        soft(scene, samples, 0).center().rays
+    };
+    let (few, many) = (reflected(16), reflected(256));
+    assert_eq!((few.shadow, many.shadow), (16, 256));
+    // The mirrored ray itself, and 4 % of those to the light, rounded up.
+    assert!(few.reflection == 2 && (11..=14).contains(&many.reflection), "{few:?} {many:?}");
 }
 
 #[test]

@@ -1,0 +1,52 @@
+//! Shares of soft light, carried along with their surface.
+//!
+//! A sample lands beside its pixel's centre, by up to half a pixel. A bit may be taken to the centre as it is: where it is
+//! not the same all around, it is asked anew. A share changes little by little, and taken as it is from frame to frame it
+//! would slide over its surface. So it is interpolated at the point of the old image that has come to the centre. Besides,
+//! that averages the noise of what few rays have found.
+
+use super::around::Tangent;
+use super::buzz_buffer::{BuzzBuffer, Projector};
+use super::centre::CastCentres;
+use crate::frame::SurfaceSample;
+
+/// Interpolates into `lit` the shares of `sample`, at the centre of pixel (x, y), near which the sample of old pixel `i`
+/// landed: between the four old pixels around that point, as far as they lie on its surface. Sets in `ask` bits of those on
+/// which they disagree, and where none lies there, of all.
+pub(super) fn carry(
+    (old, i): (&BuzzBuffer, usize),
+    view: &Projector,
+    (x, y): (usize, usize),
+    sample: &SurfaceSample,
+    rays: &impl CastCentres,
+    (lit, ask): (&mut [u32], &mut [u32]),
+) {
+    if sample.surface.is_background() {
+        return;
+    }
+    let Some(landed) = view.project(old.position[i], old.normal[i].get(), false) else {
+        return rays.confirm(ask);
+    };
+    let (width, height) = (old.width(), old.height());
+    // In old pixels. Between two frames an image hardly turns or grows, so a step is as long in both.
+    let column = (i % width) as f32 + x as f32 + 0.5 - landed.x;
+    let row = (i / width) as f32 + y as f32 + 0.5 - landed.y;
+    let tangent = Tangent::new(*sample, view);
+    let corners: [(usize, f32); 4] = std::array::from_fn(|step| {
+        let (left, top) = (column.floor() + (step % 2) as f32, row.floor() + (step / 2) as f32);
+        if left < 0.0 || top < 0.0 || left >= width as f32 || top >= height as f32 {
+            return (i, 0.0);
+        }
+        let pixel = top as usize * width + left as usize;
+        let weight = (1.0 - (column - left).abs()) * (1.0 - (row - top).abs());
+        // The bars of a window and the panes behind them are two things, though they are within a pixel's width.
+        let is_same_thing = old.surface[pixel].instance == sample.surface.instance;
+        (pixel, if is_same_thing && tangent.may_lend(&old.sample(pixel)) { weight } else { 0.0 })
+    });
+    let mut known = corners.iter().filter(|&&(_, weight)| weight > 0.0);
+    rays.blend(known.clone().map(|&(pixel, weight)| (old.lit(pixel), weight)), lit);
+    match known.next() {
+        Some(&(first, _)) => known.for_each(|&(other, _)| rays.differ(old.lit(first), old.lit(other), ask)),
+        None => rays.confirm(ask),
+    }
+}
