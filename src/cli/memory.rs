@@ -3,10 +3,10 @@
 use super::job::Job;
 use anyhow::Result;
 use buzz::error::Error;
-use buzz::infer::{BuzzBuffer, Inference};
+use buzz::infer::Inference;
 use buzz::output::{ExrSink, peak_bytes};
 use buzz::scene::Requirements;
-use buzz::sequence::render_buffers;
+use buzz::sequence::render_bytes_per_pixel;
 use buzz::trace::lit_words;
 
 /// Stacks, and what each thread encodes at a time.
@@ -25,7 +25,7 @@ pub fn refuse_over(limit: u64, job: &Job) -> Result<()> {
     }
     let mebibytes = |bytes: u64| bytes.div_ceil(1 << 20);
     let message = format!(
-        "--memory: rendering is estimated to take {} MiB ({} MiB of them for the scene), over the {} MiB allowed; allow more, or lower --resolution, --aov or --threads",
+        "--memory: rendering is estimated to take {} MiB ({} MiB of them for the scene), over the {} MiB allowed; allow more, or lower --resolution, --aa, --aov or --threads",
         mebibytes(estimate),
         mebibytes(held),
         limit >> 20
@@ -40,8 +40,7 @@ fn rendering(job: &Job) -> u64 {
     let lights = scene.lights.len();
     let words = lit_words(scene, settings.trace_options());
     let moves = Requirements::of(scene).moving_objects;
-    let inference = render_buffers(settings) * BuzzBuffer::bytes_per_pixel(words)
-        + Inference::bytes_per_pixel(words, moves);
+    let inference = render_bytes_per_pixel(settings, words) + Inference::bytes_per_pixel(settings.aa, words, moves);
     // One frame is filled while others are encoded; a file is at most as large as the layers that it is made of.
     let frame = settings.aovs.bytes_per_pixel(lights);
     let frames = (ExrSink::IN_FLIGHT + 1) * frame + ExrSink::IN_FLIGHT * frame;

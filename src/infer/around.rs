@@ -11,14 +11,14 @@ use rayon::prelude::*;
 const STEP: f32 = 1.0;
 
 /// Least cosine between normals of samples that may lend each other shadow bits.
-const SAME_FACING: f32 = 0.9;
+pub(super) const SAME_FACING: f32 = 0.9;
 
 /// So many samples on its surface must agree before a pixel that was cast borrows shadow bits from the 5x5 around it.
 /// Fewer are all on one side of it, as at the foot of a wall, where a shadow begins.
-const ENOUGH_TO_LEND: usize = 6;
+pub(super) const ENOUGH_TO_LEND: usize = 6;
 
 /// A sample that landed this near to its pixel's centre, in pixels, is as good as at it.
-const AT_CENTRE: f32 = 1.0 / 256.0;
+pub(super) const AT_CENTRE: f32 = 1.0 / 256.0;
 
 /// Nothing landed on the pixel. The numbers of old pixels are below: an image has fewer than 2^30 pixels.
 const NOTHING: u32 = (1 << 30) - 1;

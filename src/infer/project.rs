@@ -24,10 +24,15 @@ impl Landings {
 
     /// Lands old sample `i` at depth `z` on a pixel; marks the pixel if another is there.
     pub(super) fn land(&self, pixel: usize, z: f32, i: usize, marks: &Marks) {
-        let landing = u64::from(z.to_bits()) << 32 | i as u64;
-        if self.0[pixel].fetch_min(landing, Relaxed) != EMPTY {
+        if self.land_beside(pixel, z, i) {
             marks.set(pixel, PixelClass::Overlapped);
         }
+    }
+
+    /// Lands a sample at depth `z` and says whether another is there.
+    pub(super) fn land_beside(&self, pixel: usize, z: f32, i: usize) -> bool {
+        let landing = u64::from(z.to_bits()) << 32 | i as u64;
+        self.0[pixel].fetch_min(landing, Relaxed) != EMPTY
     }
 
     /// Depth of what landed on the pixel; none where nothing did.

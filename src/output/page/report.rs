@@ -90,10 +90,26 @@ impl Report {
                 ),
             ),
         ];
+        let subpixels = totals.subpixels;
+        if !subpixels.is_empty() {
+            rows.push((
+                "Sub-pixels",
+                format!(
+                    "{} beside the centres, {} of them reused ({}); {} landed for nothing",
+                    grouped(subpixels.sampled),
+                    grouped(subpixels.reused),
+                    percent(subpixels.reused, subpixels.sampled),
+                    grouped(subpixels.wasted)
+                ),
+            ));
+        }
         if let Some(hidden) = totals.hidden {
             rows.push((
                 "Hidden samples",
-                format!("{} of {} reused ({})", grouped(hidden), grouped(reused), percent(hidden, reused)),
+                {
+                    let reused = reused + subpixels.reused;
+                    format!("{} of {} reused ({})", grouped(hidden), grouped(reused), percent(hidden, reused))
+                },
             ));
         }
         let rows: String =
