@@ -40,7 +40,8 @@ fn rendering(job: &Job) -> u64 {
     let lights = scene.lights.len();
     let words = lit_words(scene, settings.trace_options());
     let moves = Requirements::of(scene).moving_objects;
-    let inference = render_bytes_per_pixel(settings, words) + Inference::bytes_per_pixel(settings.aa, words, moves);
+    let inference =
+        render_bytes_per_pixel(settings, words) + Inference::bytes_per_pixel(settings.aa, words, moves);
     // One frame is filled while others are encoded; a file is at most as large as the layers that it is made of.
     let frame = settings.aovs.bytes_per_pixel(lights);
     let frames = (ExrSink::IN_FLIGHT + 1) * frame + ExrSink::IN_FLIGHT * frame;

@@ -122,7 +122,10 @@ impl Cells {
 
     /// Divides the cells for which `is_divided` says so, given the cell and its corners in the image; others that stand out
     /// of the image by half or more are left whole.
-    pub fn divide(&mut self, is_divided: impl Fn([usize; 2], &mut dyn Iterator<Item = Position>) -> bool + Sync) {
+    pub fn divide(
+        &mut self,
+        is_divided: impl Fn([usize; 2], &mut dyn Iterator<Item = Position>) -> bool + Sync,
+    ) {
         let (lattice, side, columns) = (self.lattice, self.side, self.columns);
         let rows = self.divided.par_chunks_mut(columns).with_min_len(8).enumerate();
         rows.for_each(|(y, row)| {
@@ -180,11 +183,7 @@ impl Cells {
         let at = |dx: usize, dy: usize| {
             Some([corner[0] + dx, corner[1] + dy].map(|c| c as u32)).filter(|&at| self.lattice.contains(at))
         };
-        [
-            at(half, 0).filter(|_| above),
-            at(0, half).filter(|_| left),
-            at(half, half).filter(|_| here),
-        ]
+        [at(half, 0).filter(|_| above), at(0, half).filter(|_| left), at(half, half).filter(|_| here)]
     }
 }
 

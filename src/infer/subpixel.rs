@@ -68,7 +68,6 @@ impl SubPixels {
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }
-
 }
 
 impl Level {
@@ -121,16 +120,25 @@ impl<'a> Samples<'a> {
 
     /// A sample and its shadow bits by number: pixels first, then level by level.
     pub fn get(&self, number: usize) -> (SurfaceSample, &'a [u32]) {
+        match self.place(number) {
+            (0, pixel) => (self.pixels.sample(pixel), self.pixels.lit(pixel)),
+            (level, rest) => {
+                let level = &self.levels[level - 1];
+                (level.samples[rest], level.lit(rest))
+            }
+        }
+    }
+
+    /// The level that a sample by number is of, counted from 0 for pixels, and its number there.
+    pub fn place(&self, number: usize) -> (usize, usize) {
         let pixels = self.pixels.object.len();
-        if number < pixels {
-            return (self.pixels.sample(number), self.pixels.lit(number));
+        let (mut level, mut rest, mut count) = (0, number, pixels);
+        while rest >= count {
+            rest -= count;
+            count = self.levels[level].samples.len();
+            level += 1;
         }
-        let (mut depth, mut rest) = (0, number - pixels);
-        while rest >= self.levels[depth].samples.len() {
-            rest -= self.levels[depth].samples.len();
-            depth += 1;
-        }
-        (self.levels[depth].samples[rest], self.levels[depth].lit(rest))
+        (level, rest)
     }
 
     /// The number of the sample at a position, if one is there.

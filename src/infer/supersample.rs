@@ -270,7 +270,7 @@ impl<R: CastCentres> Source for Carried<'_, R> {
             return false;
         }
         let own = self.landed(slot.at);
-        if let Some(own) = own.filter(|&own| self.trust.is_none() || self.is_at(own, slot.at)) {
+        if let Some(own) = own.filter(|_| self.trust.is_none() || self.stands_still(slot.at)) {
             let (sample, lit) = self.old.get(own);
             *slot.sample = sample;
             slot.lit.copy_from_slice(lit);
@@ -309,6 +309,13 @@ impl<R: CastCentres> Carried<'_, R> {
     /// The number of the old sample that landed nearest to the eye.
     fn landed(&self, at: Position) -> Option<usize> {
         self.landings.source(at[1] as usize * self.old.lattice.size().0 + at[0] as usize)
+    }
+
+    /// True if all that landed here and around lies in its very place: nothing moves. Something landed here. What is far away
+    /// stays in place though the outline before it moves, so more than one sub-pixel must be looked at.
+    fn stands_still(&self, at: Position) -> bool {
+        let is_still = |at| self.landed(at).is_none_or(|number| self.is_at(number, at));
+        is_still(at) && around(at, 1).filter(|&at| self.old.lattice.contains(at)).all(is_still)
     }
 
     /// True if a sample lies at the very place.
@@ -351,6 +358,13 @@ impl<R: CastCentres> Carried<'_, R> {
     }
 }
 
+/// The positions around one, in rows from the top; some may lie outside the image.
+fn around([x, y]: Position, reach: i32) -> impl Iterator<Item = Position> {
+    let block = (-reach..=reach).flat_map(move |dy| (-reach..=reach).map(move |dx| (dx, dy)));
+    let others = block.filter(|&by| by != (0, 0));
+    others.map(move |(dx, dy)| [x.wrapping_add_signed(dx), y.wrapping_add_signed(dy)])
+}
+
 /// The samples that landed on the sub-pixels around one and on it: on it first, then in rows from the top.
 struct Near<'a, R> {
     carried: &'a Carried<'a, R>,
@@ -365,11 +379,7 @@ impl<'a, R: CastCentres> Near<'a, R> {
     fn new(carried: &'a Carried<'a, R>, at: Position, reach: i32) -> Self {
         let mut this = Self { carried, known: [0; 25], count: 0, size: 0 };
         this.look(at);
-        for dy in -reach..=reach {
-            for dx in (-reach..=reach).filter(|&dx| (dx, dy) != (0, 0)) {
-                this.look([at[0].wrapping_add_signed(dx), at[1].wrapping_add_signed(dy)]);
-            }
-        }
+        around(at, reach).for_each(|at| this.look(at));
         this
     }
 

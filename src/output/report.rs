@@ -3,7 +3,9 @@
 use super::SettingsHash;
 use super::runs::{Run, RunSeconds};
 use super::write::write_alone;
-use crate::frame::{FrameId, FrameKind, FrameStats, PixelClass, RayCounts, StageSeconds, StereoEye, SubPixelCounts};
+use crate::frame::{
+    FrameId, FrameKind, FrameStats, PixelClass, RayCounts, StageSeconds, StereoEye, SubPixelCounts,
+};
 use crate::plan;
 use crate::scene::{Ignored, Rational};
 use crate::{Error, Result};

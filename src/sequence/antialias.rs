@@ -113,6 +113,11 @@ fn visit_quarter(
     }
 }
 
+/// The view with beams as wide as the sub-pixels of a level, counted from 0 for pixels, for textures to be looked up.
+fn beams(view: View, level: usize) -> View {
+    View { width: view.width << level, height: view.height << level, ..view }
+}
+
 /// Finds the samples of a level and shades them: those that are `stored`, and others from what is `known` around them.
 fn shade_level(
     resolver: &Resolver<'_>,
@@ -121,20 +126,19 @@ fn shade_level(
     (stored, known): (Samples<'_>, Samples<'_>),
     pixels: &mut [Pixel],
 ) -> RayCounts {
-    // Textures are looked up for beams as wide as the sub-pixel.
-    let whole = resolver.shot.view;
-    let view = View { width: whole.width << (depth + 1), height: whole.height << (depth + 1), ..whole };
+    let view = beams(resolver.shot.view, depth + 1);
     let (stride, words) = (level.stride(), level.words());
     let half = level.cells.side() as u32 / 2;
     let Level { cells, samples, lit, .. } = level;
     let places = cells.positions().par_iter().zip(samples).zip(lit.par_chunks_mut(stride)).zip(pixels);
-    let shade = |(((&at, sample), lit), pixel): (((&Position, &mut SurfaceSample), &mut [u32]), &mut Pixel)| {
-        let found = stored.at(at).or_else(|| between(resolver, known, at, half));
-        let Some((found, bits)) = found else { return RayCounts::default() };
-        *sample = found;
-        lit[..words].copy_from_slice(bits);
-        resolver.shade_sample(&view, sample, &lit[..words], pixel)
-    };
+    let shade =
+        |(((&at, sample), lit), pixel): (((&Position, &mut SurfaceSample), &mut [u32]), &mut Pixel)| {
+            let found = stored.at(at).or_else(|| between(resolver, known, at, half));
+            let Some((found, bits)) = found else { return RayCounts::default() };
+            *sample = found;
+            lit[..words].copy_from_slice(bits);
+            resolver.shade_sample(&view, sample, &lit[..words], pixel)
+        };
     places.with_min_len(64).map(shade).sum()
 }
 
@@ -157,7 +161,8 @@ fn between<'a>(
     let [x, y] = at.map(|c| lattice.to_raster(c));
     let met = resolver.tracer.nearest_of(&resolver.shot.view, x, y, around.clone().map(|(sample, _)| sample));
     let primitive = |s: &SurfaceSample| (s.surface.instance, s.surface.primitive);
-    let of_same = |met: &SurfaceSample| around.clone().find(|(sample, _)| primitive(sample) == primitive(met));
+    let of_same =
+        |met: &SurfaceSample| around.clone().find(|(sample, _)| primitive(sample) == primitive(met));
     match met.and_then(|met| Some((met, of_same(&met)?.1))) {
         Some(found) => Some(found),
         None => around.clone().next(),
@@ -200,7 +205,8 @@ impl Resolver<'_> {
         let mut mean = glam::Vec3::ZERO;
         antialias.visit(buffer, pixel, |number, weight| {
             let (sample, lit) = samples.get(number);
-            mean += weight * self.tracer.light_diffuse(&self.shot.view, &sample, lit, light);
+            let view = beams(self.shot.view, samples.place(number).0);
+            mean += weight * self.tracer.light_diffuse(&view, &sample, lit, light);
         });
         mean.to_array()
     }

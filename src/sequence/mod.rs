@@ -358,8 +358,7 @@ impl Emitter<'_> {
         stats.seconds.trace = cost.tracing.as_secs_f64();
         if self.settings.aa > 1 {
             let on_lattice = caster.on(new.finer.lattice());
-            let (cost, subpixels) =
-                inference.infer_subpixels(old, new, &to.view, origin, trust, &on_lattice);
+            let (cost, subpixels) = inference.infer_subpixels(old, new, &to.view, origin, trust, &on_lattice);
             stats.rays += cost.rays;
             stats.subpixels = subpixels;
             stats.seconds.trace += cost.tracing.as_secs_f64();

@@ -67,12 +67,7 @@ impl Pixel {
 
 impl Resolver<'_> {
     /// Fills the layers that the settings ask for; returns the rays that reflection and refraction took.
-    pub fn resolve(
-        &self,
-        buffer: &BuzzBuffer,
-        antialias: &mut Antialias,
-        frame: &mut Frame,
-    ) -> RayCounts {
+    pub fn resolve(&self, buffer: &BuzzBuffer, antialias: &mut Antialias, frame: &mut Frame) -> RayCounts {
         let window = self.settings.window;
         frame.window = window;
         let pixels = window.pixels();

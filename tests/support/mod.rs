@@ -2,7 +2,9 @@
 
 #![allow(dead_code)] // Not every test uses everything.
 
-use buzz::frame::{Frame, FrameKind, FrameStats, Matte, PixelClass, RayCounts, StageSeconds, SubPixelCounts, Window};
+use buzz::frame::{
+    Frame, FrameKind, FrameStats, Matte, PixelClass, RayCounts, StageSeconds, SubPixelCounts, Window,
+};
 use buzz::output::{Compression, FileOptions, SettingsHash, SettingsHasher};
 use buzz::scene::{Lens, Projection, Rational, View};
 use glam::{DVec2, DVec3};

@@ -104,13 +104,10 @@ impl Report {
             ));
         }
         if let Some(hidden) = totals.hidden {
-            rows.push((
-                "Hidden samples",
-                {
-                    let reused = reused + subpixels.reused;
-                    format!("{} of {} reused ({})", grouped(hidden), grouped(reused), percent(hidden, reused))
-                },
-            ));
+            rows.push(("Hidden samples", {
+                let reused = reused + subpixels.reused;
+                format!("{} of {} reused ({})", grouped(hidden), grouped(reused), percent(hidden, reused))
+            }));
         }
         let rows: String =
             rows.iter().map(|(name, value)| format!("<dt>{name}</dt><dd>{value}</dd>")).collect();
