@@ -48,8 +48,9 @@ impl Lattice {
 
     /// True for positions in the image, its border included.
     pub fn contains(&self, [x, y]: Position) -> bool {
-        let half = self.steps / 2;
-        let inside = |at: u32, pixels: usize| (half..=pixels * self.steps + half).contains(&(at as usize));
+        // Half a pixel from a centre, which with one level is between two positions.
+        let (first, half) = (self.steps.div_ceil(2), self.steps / 2);
+        let inside = |at: u32, pixels: usize| (first..=pixels * self.steps + half).contains(&(at as usize));
         inside(x, self.width) && inside(y, self.height)
     }
 
@@ -221,7 +222,7 @@ mod tests {
         cells.divide(|cell, _| cell == [2, 2]);
         assert_eq!(cells.positions(), [[5, 4], [4, 5], [5, 5], [6, 5], [5, 6]]);
         cells.divide(|cell, _| cell == [2, 2] || cell == [3, 2]);
-        assert_eq!(cells.positions().len(), 8);
+        assert_eq!(cells.positions().len(), 9);
         for (number, &at) in cells.positions().iter().enumerate() {
             assert_eq!(cells.find(at), Some(number));
         }
