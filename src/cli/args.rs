@@ -1,5 +1,6 @@
 //! Arguments as typed.
 
+use buzz::sequence::Settings;
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use std::path::PathBuf;
 
@@ -182,6 +183,9 @@ pub struct OutputArgs {
     /// Depth of reflection and refraction.
     #[arg(long, default_value_t = 4, allow_negative_numbers = true, value_parser = clap::value_parser!(u32).range(..=64))]
     pub bounces: u32,
+    /// Levels of super-sampling: 1 is one sample a pixel, 2 and 3 take up to 3x3 and 5x5 where neighbours differ.
+    #[arg(long, value_name = "LEVELS", default_value_t = 1, allow_negative_numbers = true, value_parser = clap::value_parser!(u32).range(1..=i64::from(Settings::MOST_LEVELS)))]
+    pub aa: u32,
     /// Shadow rays to each light that has a size; a single one goes to its middle.
     #[arg(long, value_name = "N", default_value_t = 1, allow_negative_numbers = true, value_parser = clap::value_parser!(u32).range(1..=4096))]
     pub light_samples: u32,

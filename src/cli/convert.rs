@@ -188,6 +188,7 @@ fn choose_image(job: &mut Job, args: &ConvertArgs) -> Result<()> {
     settings.transparent = args.output.transparent;
     settings.exposure = args.output.exposure;
     settings.bounces = args.output.bounces;
+    settings.aa = args.output.aa;
     settings.light_samples = args.output.light_samples;
     settings.ambient_samples = args.output.ambient_samples;
     settings.audit = args.output.audit;
@@ -333,7 +334,7 @@ fn report(
             height: job.settings.height,
             fps: output::Settings::fps(scene.timing.fps),
             threads: job.threads,
-            aa: 1,
+            aa: job.settings.aa,
         },
         scene: SceneSummary {
             triangles: scene.triangle_count(),

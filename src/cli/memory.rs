@@ -3,10 +3,10 @@
 use super::job::Job;
 use anyhow::Result;
 use buzz::error::Error;
-use buzz::infer::{BuzzBuffer, Inference};
+use buzz::infer::Inference;
 use buzz::output::{ExrSink, peak_bytes};
 use buzz::scene::{Requirements, Scene};
-use buzz::sequence::{Quality, Settings, render_buffers};
+use buzz::sequence::{Quality, Settings, render_bytes_per_pixel};
 use buzz::trace::lit_words;
 
 /// Stacks, and what each thread encodes at a time.
@@ -25,7 +25,7 @@ pub fn refuse_over(limit: u64, job: &Job) -> Result<()> {
     }
     let mebibytes = |bytes: u64| bytes.div_ceil(1 << 20);
     let message = format!(
-        "--memory: rendering is estimated to take {} MiB ({} MiB of them for the scene), over the {} MiB allowed; allow more, or lower --resolution, --aov or --threads",
+        "--memory: rendering is estimated to take {} MiB ({} MiB of them for the scene), over the {} MiB allowed; allow more, or lower --resolution, --aa, --aov or --threads",
         mebibytes(estimate),
         mebibytes(held),
         limit >> 20
@@ -50,6 +50,8 @@ pub fn held_per_pixel(scene: &Scene, settings: &Settings) -> usize {
     let words = lit_words(scene, settings.trace_options());
     let infers = settings.quality != Quality::Full;
     let moves = Requirements::of(scene).moving_objects;
-    let inference = if infers { Inference::bytes_per_pixel(words, moves) } else { 0 };
-    render_buffers(settings, infers) * BuzzBuffer::bytes_per_pixel(words) + inference
+    // Super-sampling keeps its book in what infers, in full frames too.
+    let works = infers || settings.aa > 1;
+    let inference = if works { Inference::bytes_per_pixel(settings.aa, words, moves) } else { 0 };
+    render_bytes_per_pixel(settings, infers, words) + inference
 }

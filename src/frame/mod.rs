@@ -14,4 +14,4 @@ pub use eye::{FrameId, StereoEye};
 pub use light_way::{LightWay, Way};
 pub use quality::Quality;
 pub use sample::{PackedNormal, SurfaceRef, SurfaceSample};
-pub use stats::{FrameStats, RayCounts, StageSeconds};
+pub use stats::{FrameStats, RayCounts, StageSeconds, SubPixelCounts};

@@ -52,6 +52,33 @@ impl Sum for RayCounts {
     }
 }
 
+/// What became of the sub-pixels beside the pixels' centres; all 0 with one level of super-sampling.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize, serde::Deserialize)]
+pub struct SubPixelCounts {
+    /// Sub-pixels that have a sample of their own.
+    pub sampled: u64,
+    /// Those of them for which no camera ray was cast.
+    pub reused: u64,
+    /// Samples of the neighbour's sub-pixels that landed in the image for nothing: where no sample is wanted, or another is
+    /// nearer to the eye (the paper's figure 14).
+    pub wasted: u64,
+}
+
+impl SubPixelCounts {
+    /// True where there are no sub-pixels.
+    pub fn is_empty(&self) -> bool {
+        *self == Self::default()
+    }
+}
+
+impl AddAssign for SubPixelCounts {
+    fn add_assign(&mut self, other: Self) {
+        self.sampled += other.sampled;
+        self.reused += other.reused;
+        self.wasted += other.wasted;
+    }
+}
+
 /// Wall seconds of a frame's stages. They go into reports, never into a frame's file.
 #[derive(Debug, Clone, Copy, PartialEq, Default, serde::Serialize, serde::Deserialize)]
 pub struct StageSeconds {
@@ -70,6 +97,8 @@ pub struct StageSeconds {
 pub struct FrameStats {
     /// Pixels of each class, by [`super::PixelClass`] number.
     pub pixels: [u64; super::PixelClass::COUNT],
+    /// Sub-pixels.
+    pub subpixels: SubPixelCounts,
     /// Rays cast.
     pub rays: RayCounts,
     /// Where the time went.

@@ -10,11 +10,11 @@ use glam::Vec3;
 const STEP: f32 = 1.0;
 
 /// Least cosine between normals of samples that may lend each other shadow bits.
-const SAME_FACING: f32 = 0.9;
+pub(super) const SAME_FACING: f32 = 0.9;
 
 /// So many samples on its surface must agree before a pixel that was cast borrows shadow bits from the 5x5 around it.
 /// Fewer are all on one side of it, as at the foot of a wall, where a shadow begins.
-const ENOUGH_TO_LEND: usize = 6;
+pub(super) const ENOUGH_TO_LEND: usize = 6;
 
 /// How much is believed without a ray.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -1,6 +1,7 @@
 //! The Buzzbuffer: a window-sized store of samples, the paper's data structure and its namesake.
 
 use super::moved::Motion;
+use super::subpixel::SubPixels;
 use crate::frame::{PackedNormal, PixelClass, RayCounts, SurfaceRef, SurfaceSample};
 use crate::scene::View;
 use glam::{DVec3, Mat4, Vec3};
@@ -11,7 +12,7 @@ pub const UNKNOWN: u32 = u32::MAX;
 
 /// One sample a pixel, as structure of arrays, rows from the top.
 ///
-/// State: 41 bytes a pixel, and 4 more for each word of shadow bits.
+/// State: 41 bytes a pixel, and 4 more for each word of shadow bits; sub-pixels come on top.
 #[derive(Debug, Clone, Default)]
 pub struct BuzzBuffer {
     width: usize,
@@ -31,6 +32,8 @@ pub struct BuzzBuffer {
     pub lit: Vec<u32>,
     /// How each pixel was obtained.
     pub class: Vec<PixelClass>,
+    /// The samples between the centres of pixels, with more than one level of super-sampling.
+    pub finer: SubPixels,
 }
 
 impl BuzzBuffer {
@@ -48,7 +51,15 @@ impl BuzzBuffer {
             normal: vec![PackedNormal::default(); n],
             lit: vec![0; n * lit_words],
             class: vec![PixelClass::Traced; n],
+            finer: SubPixels::default(),
         }
+    }
+
+    /// The same with so many levels of super-sampling.
+    #[must_use]
+    pub fn with_levels(mut self, levels: u32) -> Self {
+        self.finer = SubPixels::new(self.width, self.height, levels, self.lit_words);
+        self
     }
 
     /// Bytes that a pixel of a buffer with so many words of shadow bits takes.
@@ -115,6 +126,7 @@ impl BuzzBuffer {
         self.normal.clone_from(&other.normal);
         self.lit.clone_from(&other.lit);
         self.class.clone_from(&other.class);
+        self.finer.clone_from(&other.finer);
     }
 
     /// Forgets everything: every pixel is wanted, as `class`.

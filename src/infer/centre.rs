@@ -89,7 +89,7 @@ pub trait CastCentres: CastRays {
 const LOOKOUT: usize = 8;
 
 /// So many samples must be known in the 3x3 around a pixel before it is filled from them.
-const ENOUGH_TO_FILL: usize = 3;
+pub(super) const ENOUGH_TO_FILL: usize = 3;
 
 fn is_lookout(x: usize, y: usize) -> bool {
     x % LOOKOUT == LOOKOUT / 2 && y % LOOKOUT == LOOKOUT / 2

@@ -16,6 +16,7 @@
 //! | test_z | in [`creeping()`] |
 //! | P, k | [`entering()`] |
 //! | X + e z_p / (d + z_p) | [`Parallax`], [`other_eye()`] |
+//! | 2^(L-1) + 1, levels of sub-pixels | [`Lattice`], [`SubPixels`], [`Supersampling`] |
 //! | moving objects, voxels; moving and variable lights | [`Motion`], [`Voxels`] |
 //! | (not in the paper) samples at pixel centres, shadows' edges followed | [`Centring`] |
 
@@ -24,6 +25,7 @@ mod buzz_buffer;
 mod centre;
 mod creeping;
 mod entering;
+mod lattice;
 mod moved;
 mod obscured;
 mod project;
@@ -31,6 +33,8 @@ mod shadow_edges;
 mod shares;
 mod sources;
 mod stereo;
+mod subpixel;
+mod supersample;
 mod turned;
 mod voxels;
 
@@ -39,10 +43,13 @@ pub use buzz_buffer::{BuzzBuffer, CastRays, Projected, Projector, UNKNOWN};
 pub use centre::{CastCentres, Centring};
 pub use creeping::{Along, creeping};
 pub use entering::entering;
+pub use lattice::{Cells, Lattice, Position};
 pub use moved::{Body, Motion};
 pub use obscured::obscured;
 pub use project::{Landings, gather, project};
 pub use stereo::{Parallax, other_eye};
+pub use subpixel::{Level, Samples, SubPixels};
+pub use supersample::Supersampling;
 pub use turned::turned;
 pub use voxels::Voxels;
 
@@ -62,6 +69,7 @@ pub struct Inference {
     landings: Landings,
     marks: Marks,
     centring: Centring,
+    supersampling: Supersampling,
     /// The old samples where their surfaces are now; used only where something moves.
     now: BuzzBuffer,
 }
@@ -85,11 +93,13 @@ pub struct Cost {
 }
 
 impl Inference {
-    /// The most that it holds for each pixel, where a pixel has so many words of shadow bits, and where something in the
-    /// scene moves or nothing does.
-    pub fn bytes_per_pixel(words: usize, moves: bool) -> usize {
-        let now = if moves { BuzzBuffer::bytes_per_pixel(words) } else { 0 };
-        size_of::<AtomicU64>() + size_of::<AtomicU8>() + Centring::bytes_per_pixel(words) + now
+    /// The most that it holds for each pixel, with so many levels of super-sampling, where a sample has so many words of
+    /// shadow bits, and where something in the scene moves or nothing does.
+    pub fn bytes_per_pixel(levels: u32, words: usize, moves: bool) -> usize {
+        let buffer = BuzzBuffer::bytes_per_pixel(words) + SubPixels::bytes_per_pixel(levels, words);
+        let now = if moves { buffer } else { 0 };
+        let marks = size_of::<AtomicU64>() + size_of::<AtomicU8>();
+        marks + Centring::bytes_per_pixel(words) + Supersampling::bytes_per_pixel(levels, words) + now
     }
 
     /// Makes `new`, the samples of `new_view`, from `old`, those of `old_view`. Positions are relative to `origin`.

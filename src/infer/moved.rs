@@ -61,6 +61,16 @@ pub(super) fn ride(old: &BuzzBuffer, motion: &dyn Motion, now: &mut BuzzBuffer) 
         }
     };
     now.rows_mut().for_each(follow_row);
+    for level in &mut now.finer.levels {
+        level.samples.par_iter_mut().with_min_len(1 << 10).for_each(|sample| {
+            if motion.body_of(sample).is_some() {
+                match motion.follow(sample) {
+                    Some(now) => *sample = now,
+                    None => sample.object = UNKNOWN,
+                }
+            }
+        });
+    }
 }
 
 /// Marks the pixels on which a sample landed before which a body may stand.

@@ -17,7 +17,7 @@ pub struct Landings(Vec<AtomicU64>);
 const EMPTY: u64 = u64::MAX;
 
 /// A sample that landed this near to its pixel's centre, in pixels, is as good as at it.
-const AT_CENTRE: f32 = 1.0 / 256.0;
+pub(super) const AT_CENTRE: f32 = 1.0 / 256.0;
 
 impl Landings {
     /// Empties all pixels ("all z values = HUGE and id_tag to -2").
@@ -34,11 +34,15 @@ impl Landings {
     /// Lands old sample `i` on the pixel that holds it; marks the pixel if another is there.
     pub(super) fn land(&self, pixel: usize, at: Projected, i: usize, marks: &Marks) {
         let is_away = |raster: f32| (raster - raster.trunc() - 0.5).abs() >= AT_CENTRE;
-        let away = is_away(at.x) || is_away(at.y);
-        let landing = u64::from(at.z.to_bits()) << 32 | (i as u64) << 1 | u64::from(away);
-        if self.0[pixel].fetch_min(landing, Relaxed) != EMPTY {
+        if self.land_beside(pixel, at.z, i, is_away(at.x) || is_away(at.y)) {
             marks.set(pixel, PixelClass::Overlapped);
         }
+    }
+
+    /// Lands a sample at depth `z`, `away` from the pixel's centre or not, and says whether another is there.
+    pub(super) fn land_beside(&self, pixel: usize, z: f32, i: usize, away: bool) -> bool {
+        let landing = u64::from(z.to_bits()) << 32 | (i as u64) << 1 | u64::from(away);
+        self.0[pixel].fetch_min(landing, Relaxed) != EMPTY
     }
 
     /// Depth of what landed on the pixel; none where nothing did.

@@ -3,7 +3,9 @@
 use super::SettingsHash;
 use super::runs::{Run, RunSeconds};
 use super::write::write_alone;
-use crate::frame::{FrameId, FrameKind, FrameStats, PixelClass, RayCounts, StageSeconds, StereoEye};
+use crate::frame::{
+    FrameId, FrameKind, FrameStats, PixelClass, RayCounts, StageSeconds, StereoEye, SubPixelCounts,
+};
 use crate::plan;
 use crate::scene::{Ignored, Rational};
 use crate::{Error, Result};
@@ -194,6 +196,9 @@ pub struct Totals {
     pub inferred_frames: usize,
     /// Pixels of each class, by its name.
     pub pixels: Map<String, Value>,
+    /// Sub-pixels beside the pixels' centres.
+    #[serde(default)]
+    pub subpixels: SubPixelCounts,
     /// Rays cast.
     pub rays: RayCounts,
     /// Wall seconds.
@@ -245,6 +250,9 @@ pub struct FrameReport {
     /// Share of pixels that were: all that are not reused.
     #[serde(default)]
     pub traced: f64,
+    /// Sub-pixels beside the pixels' centres.
+    #[serde(default)]
+    pub subpixels: SubPixelCounts,
     /// Rays cast.
     pub rays: RayCounts,
     /// Wall seconds; those of a skipped frame stand in an earlier run's report, and are 0 if there is none.
@@ -294,6 +302,7 @@ impl Totals {
         for FrameRecord { kind, stats, .. } in &input.frames {
             traced_frames += usize::from(*kind == FrameKind::Traced);
             sum.rays += stats.rays;
+            sum.subpixels += stats.subpixels;
             for (total, pixels) in sum.pixels.iter_mut().zip(stats.pixels) {
                 *total += pixels;
             }
@@ -317,6 +326,7 @@ impl Totals {
             traced_frames,
             inferred_frames: input.frames.len() - traced_frames,
             pixels: pixels_by_name(&sum.pixels),
+            subpixels: sum.subpixels,
             rays: sum.rays,
             seconds: TotalSeconds {
                 import: of_runs(|s| s.import),
@@ -356,6 +366,7 @@ impl FrameReport {
                 .filter(|_| record.id.eye != Some(StereoEye::Right))
                 .map(|&share| millionths(share)),
             traced: traced_share(&record.stats.pixels),
+            subpixels: record.stats.subpixels,
             rays: record.stats.rays,
             seconds: rounded(record.stats.seconds),
             hidden: record.stats.hidden,
@@ -401,7 +412,8 @@ mod tests {
         pixels[class as usize] = 100;
         let rays = RayCounts { primary: 7, shadow: 5, ..RayCounts::default() };
         let seconds = StageSeconds { infer: 0.123_456_789, ..StageSeconds::default() };
-        FrameStats { pixels, rays, seconds, hidden }
+        let subpixels = SubPixelCounts { sampled: 9, reused: 6, wasted: 2 };
+        FrameStats { pixels, subpixels, rays, seconds, hidden }
     }
 
     fn report() -> Report {
@@ -469,6 +481,7 @@ mod tests {
         let shares: Vec<_> = report.frames.iter().map(|f| (f.predicted_traced, f.traced)).collect();
         assert_eq!(shares, [(Some(1.0), 1.0), (None, 0.0)]);
         assert_eq!(report.totals.rays.primary, 14);
+        assert_eq!(report.totals.subpixels, SubPixelCounts { sampled: 18, reused: 12, wasted: 4 });
         assert_eq!(report.totals.hidden, Some(3));
         assert_eq!(report.frames[1].seconds.infer, 0.123_457);
         assert_eq!(report.totals.seconds.wall, 0.0);

@@ -3,12 +3,13 @@
 use super::Observer;
 use super::motion::SceneMotion;
 use crate::frame::{RayCounts, SurfaceSample};
-use crate::infer::{CastCentres, CastRays, Motion};
+use crate::infer::{CastCentres, CastRays, Lattice, Motion};
 use crate::scene::View;
 use crate::trace::{Eye, Tracer};
 use glam::Vec3;
 
 /// Casts the rays of one frame.
+#[derive(Clone, Copy)]
 pub(super) struct Caster<'a> {
     pub tracer: &'a Tracer<'a>,
     pub view: &'a View,
@@ -19,6 +20,22 @@ pub(super) struct Caster<'a> {
     pub jitter: Option<u64>,
     /// What differs from the frame that is inferred from, if anything but the camera.
     pub motion: Option<&'a SceneMotion<'a>>,
+    /// Distance between the places that rays are asked for by number, in pixels.
+    pub spacing: f64,
+    /// Raster coordinate of the first.
+    pub first: f64,
+}
+
+impl Caster<'_> {
+    /// The same for positions of a lattice instead of pixels.
+    pub fn on(self, lattice: Lattice) -> Self {
+        Self { spacing: 1.0 / lattice.steps() as f64, first: -0.5, jitter: None, ..self }
+    }
+
+    /// Raster coordinates.
+    fn place(&self, x: usize, y: usize) -> (f64, f64) {
+        (x as f64 * self.spacing + self.first, y as f64 * self.spacing + self.first)
+    }
 }
 
 impl CastRays for Caster<'_> {
@@ -31,11 +48,13 @@ impl CastRays for Caster<'_> {
     }
 
     fn cast(&self, x: usize, y: usize, lit: &mut [u32], counts: &mut RayCounts) -> SurfaceSample {
-        let offset = self.jitter.map_or([0.5; 2], |seed| {
+        let place = self.jitter.map_or(self.place(x, y), |seed| {
             let bits = mix(seed ^ ((y as u64) << 32 | x as u64));
-            [bits as u32, (bits >> 32) as u32].map(|b| f64::from(b) / (f64::from(u32::MAX) + 1.0))
+            let [dx, dy] =
+                [bits as u32, (bits >> 32) as u32].map(|b| f64::from(b) / (f64::from(u32::MAX) + 1.0));
+            (x as f64 + dx, y as f64 + dy)
         });
-        self.tracer.cast(&self.eye, x as f64 + offset[0], y as f64 + offset[1], lit, counts)
+        self.tracer.cast(&self.eye, place.0, place.1, lit, counts)
     }
 
     fn motion(&self) -> Option<&dyn Motion> {
@@ -45,7 +64,8 @@ impl CastRays for Caster<'_> {
 
 impl CastCentres for Caster<'_> {
     fn hit(&self, x: usize, y: usize, counts: &mut RayCounts) -> SurfaceSample {
-        self.tracer.hit(&self.eye, x as f64 + 0.5, y as f64 + 0.5, counts)
+        let (x, y) = self.place(x, y);
+        self.tracer.hit(&self.eye, x, y, counts)
     }
 
     fn recast(&self, sample: &SurfaceSample, ask: &[u32], lit: &mut [u32], counts: &mut RayCounts) {
@@ -82,7 +102,8 @@ impl CastCentres for Caster<'_> {
         y: usize,
         candidates: impl Iterator<Item = SurfaceSample>,
     ) -> Option<SurfaceSample> {
-        self.tracer.nearest_of(&self.eye, x as f64 + 0.5, y as f64 + 0.5, candidates)
+        let (x, y) = self.place(x, y);
+        self.tracer.nearest_of(&self.eye, x, y, candidates)
     }
 
     fn is_hidden(&self, sample: &SurfaceSample, counts: &mut RayCounts) -> bool {

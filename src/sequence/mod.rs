@@ -2,6 +2,7 @@
 //!
 //! [`camera_path`] gives the planner what it asks for, [`crate::plan::plan`] decides, [`render_sequence`] renders.
 
+mod antialias;
 mod caster;
 mod motion;
 mod path;
@@ -16,10 +17,11 @@ use crate::error::{Error, Result};
 use crate::frame::{
     Aov, AovSet, Frame, FrameId, FrameKind, FrameStats, PixelClass, StageSeconds, StereoEye, Window,
 };
-use crate::infer::{BuzzBuffer, Inference, Move, Projector, Trust};
+use crate::infer::{BuzzBuffer, Inference, Move, Projector, SubPixels, Trust};
 use crate::plan::{Plan, Segment};
 use crate::scene::{Pose, Requirements, Scene, Stereo, View};
 use crate::trace::{TraceOptions, Tracer, lit_words};
+use antialias::Antialias;
 use caster::{Caster, mix};
 use glam::DVec3;
 use motion::SceneMotion;
@@ -58,6 +60,8 @@ pub struct Settings {
     pub exposure: f32,
     /// Depth of reflection and refraction.
     pub bounces: u32,
+    /// Levels of super-sampling, 1 to [`Settings::MOST_LEVELS`]; 1 is one sample a pixel.
+    pub aa: u32,
     /// Shadow rays to each light that has a size.
     pub light_samples: u32,
     /// Rays to the world from each point, where there is one.
@@ -74,6 +78,9 @@ pub struct Settings {
 }
 
 impl Settings {
+    /// Most levels of super-sampling.
+    pub const MOST_LEVELS: u32 = 3;
+
     /// The whole image, beauty only.
     pub fn new(width: u32, height: u32) -> Self {
         Self {
@@ -85,6 +92,7 @@ impl Settings {
             transparent: false,
             exposure: 0.0,
             bounces: 4,
+            aa: 1,
             light_samples: 1,
             ambient_samples: 0,
             audit: false,
@@ -166,9 +174,16 @@ pub fn render_sequence(
     Ok(())
 }
 
-/// How many [`BuzzBuffer`]s [`render_sequence`] holds: the key frame's; if other frames are inferred from it, the
-/// neighbour's and the frame's own; and the right eye's in stereo.
-pub fn render_buffers(settings: &Settings, infers: bool) -> usize {
+/// The most bytes that [`render_sequence`] holds for each pixel, beside what [`Inference`] and frames take, where a sample has
+/// so many words of shadow bits.
+pub fn render_bytes_per_pixel(settings: &Settings, infers: bool, words: usize) -> usize {
+    let buffer = BuzzBuffer::bytes_per_pixel(words) + SubPixels::bytes_per_pixel(settings.aa, words);
+    render_buffers(settings, infers) * buffer + Antialias::bytes_per_pixel(settings.aa, words)
+}
+
+/// The key frame's buffer; if other frames are inferred from it, the neighbour's and the frame's own; and the right eye's
+/// in stereo.
+fn render_buffers(settings: &Settings, infers: bool) -> usize {
     let carried = if infers { 3 } else { 1 };
     carried + usize::from(settings.stereo.is_some())
 }
@@ -182,6 +197,7 @@ struct Buffers {
     /// The right eye's, in stereo.
     right: BuzzBuffer,
     inference: Inference,
+    antialias: Antialias,
 }
 
 impl Buffers {
@@ -192,7 +208,7 @@ impl Buffers {
         let carried = [&mut self.key, &mut self.old, &mut self.new];
         for buffer in right.into_iter().chain(carried).take(render_buffers(settings, infers)) {
             if (buffer.width(), buffer.height(), buffer.lit_words()) != (width, height, lit_words) {
-                *buffer = BuzzBuffer::new(width, height, lit_words);
+                *buffer = BuzzBuffer::new(width, height, lit_words).with_levels(settings.aa);
             }
         }
     }
@@ -215,12 +231,13 @@ fn render_segment(
     let infers = segment.first < segment.last;
     buffers.fit(settings, infers, lit_words(scene, settings.trace_options()));
     let names = settings.aovs.contains(Aov::Crypto).then(|| MatteNames::of(scene));
-    let mut emitter = Emitter { scene, settings, segment, origin, cuts, wanted, names, sink, observer };
-    let Buffers { key, old, new, right, inference } = buffers;
+    let Buffers { key, old, new, right, inference, antialias } = buffers;
+    let mut emitter =
+        Emitter { scene, settings, segment, origin, cuts, wanted, names, antialias, sink, observer };
 
     accel.place(scene, &key_shot.pose, origin);
     let tracer = Tracer::new(scene, accel, &key_shot.pose, settings.trace_options());
-    let stats = emitter.trace(&tracer, &key_shot, key);
+    let stats = emitter.trace(&tracer, &key_shot, key, inference);
     emitter.emit((accel, &tracer), &key_shot, key, stats)?;
     emitter.emit_right((accel, &tracer), (key, &key_shot), right, inference)?;
 
@@ -289,6 +306,7 @@ struct Emitter<'a> {
     cuts: &'a [i64],
     wanted: &'a BTreeSet<i64>,
     names: Option<MatteNames>,
+    antialias: &'a mut Antialias,
     sink: &'a mut dyn FrameSink,
     observer: &'a mut dyn Observer,
 }
@@ -301,6 +319,7 @@ impl Emitter<'_> {
         motion: Option<&'a SceneMotion<'a>>,
     ) -> Caster<'a> {
         let jitter = self.settings.jitter.map(|seed| mix(seed ^ shot.frame as u64));
+        let (spacing, first) = (1.0, 0.5);
         Caster {
             tracer,
             view: &shot.view,
@@ -308,16 +327,28 @@ impl Emitter<'_> {
             observer: &*self.observer,
             jitter,
             motion,
+            spacing,
+            first,
         }
     }
 
-    /// Casts a ray through every pixel.
-    fn trace(&self, tracer: &Tracer<'_>, shot: &Shot, buffer: &mut BuzzBuffer) -> FrameStats {
+    /// Casts a ray through every pixel, and more where these differ.
+    fn trace(
+        &self,
+        tracer: &Tracer<'_>,
+        shot: &Shot,
+        buffer: &mut BuzzBuffer,
+        inference: &mut Inference,
+    ) -> FrameStats {
         let start = Instant::now();
         buffer.forget(PixelClass::Traced);
         let projector = Projector::new(&shot.view, self.origin);
-        let rays = buffer.cast_unknown(&projector, &self.caster(tracer, shot, None));
-        let mut stats = FrameStats { rays, ..FrameStats::default() };
+        let caster = self.caster(tracer, shot, None);
+        let rays = buffer.cast_unknown(&projector, &caster);
+        let on_lattice = caster.on(buffer.finer.lattice());
+        let (cost, subpixels) = inference.trace_subpixels(buffer, &shot.view, self.origin, &on_lattice);
+        let mut stats =
+            FrameStats { rays: [rays, cost.rays].into_iter().sum(), subpixels, ..FrameStats::default() };
         stats.seconds.trace = start.elapsed().as_secs_f64();
         stats
     }
@@ -332,16 +363,25 @@ impl Emitter<'_> {
         inference: &mut Inference,
     ) -> FrameStats {
         let start = Instant::now();
-        let (source, target, origin) = ((old, &from.view), (new, &to.view), self.origin);
-        let cost = match self.settings.quality {
-            Quality::Full | Quality::HalfPixel => inference.infer(by, source, target, origin, caster),
-            Quality::Centred => {
-                inference.infer_centred(by, source, target, origin, Trust::Neighbours, caster)
-            }
-            Quality::Verified => inference.infer_centred(by, source, target, origin, Trust::Proof, caster),
+        let (source, target, origin) = ((old, &from.view), (&mut *new, &to.view), self.origin);
+        let trust = match self.settings.quality {
+            Quality::Full | Quality::HalfPixel => None,
+            Quality::Centred => Some(Trust::Neighbours),
+            Quality::Verified => Some(Trust::Proof),
+        };
+        let cost = match trust {
+            None => inference.infer(by, source, target, origin, caster),
+            Some(trust) => inference.infer_centred(by, source, target, origin, trust, caster),
         };
         let mut stats = FrameStats { rays: cost.rays, ..FrameStats::default() };
         stats.seconds.trace = cost.tracing.as_secs_f64();
+        if self.settings.aa > 1 {
+            let on_lattice = caster.on(new.finer.lattice());
+            let (cost, subpixels) = inference.infer_subpixels(old, new, &to.view, origin, trust, &on_lattice);
+            stats.rays += cost.rays;
+            stats.subpixels = subpixels;
+            stats.seconds.trace += cost.tracing.as_secs_f64();
+        }
         stats.seconds.infer = start.elapsed().as_secs_f64() - stats.seconds.trace;
         stats
     }
@@ -387,7 +427,7 @@ impl Emitter<'_> {
                 previous: self.neighbour(accel, shot, number - 1, self.cuts.contains(&number)),
                 names: self.names.as_ref(),
             };
-            stats.rays += resolver.resolve(buffer, &mut frame);
+            stats.rays += resolver.resolve(buffer, self.antialias, &mut frame);
             stats.seconds.enhance = start.elapsed().as_secs_f64();
             if self.settings.audit {
                 stats.hidden = Some(count_hidden(tracer, &*self.observer, &shot.view, buffer));

@@ -1,12 +1,13 @@
 //! From samples to a frame's layers: the paper's enhancement of every pixel, traced or reused alike.
 
+use super::antialias::Antialias;
 use super::{Observer, Settings, Shot};
 use crate::accel::Displaced;
 use crate::frame::{Aov, Frame, FrameKind, FrameStats, Matte, RayCounts, SurfaceSample, Window};
 use crate::infer::BuzzBuffer;
 use crate::scene::{Scene, View};
 use crate::trace::{Eye, Tracer};
-use glam::{DVec3, DVec4, Vec3};
+use glam::{DVec3, DVec4, Vec3, Vec4};
 use rayon::prelude::*;
 use std::sync::Arc;
 
@@ -43,16 +44,32 @@ impl MatteNames {
 }
 
 /// The layers of one pixel that come from shading.
-struct Pixel {
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Pixel {
     color: [f32; 4],
     diffuse: Vec3,
     specular: Vec3,
     emission: Vec3,
 }
 
+impl Pixel {
+    /// Adds a share of another.
+    pub fn add(&mut self, other: &Self, weight: f32) {
+        self.color.iter_mut().zip(other.color).for_each(|(sum, value)| *sum += weight * value);
+        self.diffuse += weight * other.diffuse;
+        self.specular += weight * other.specular;
+        self.emission += weight * other.emission;
+    }
+
+    /// The colour as a display shows it: clipped, and close to evenly spaced to the eye.
+    pub fn encoded(&self) -> Vec4 {
+        Vec4::from_array(self.color).clamp(Vec4::ZERO, Vec4::ONE).map(f32::sqrt)
+    }
+}
+
 impl Resolver<'_> {
     /// Fills the layers that the settings ask for; returns the rays that reflection and refraction took.
-    pub fn resolve(&self, buffer: &BuzzBuffer, frame: &mut Frame) -> RayCounts {
+    pub fn resolve(&self, buffer: &BuzzBuffer, antialias: &mut Antialias, frame: &mut Frame) -> RayCounts {
         let window = self.settings.window;
         frame.window = window;
         let pixels = window.pixels();
@@ -62,7 +79,10 @@ impl Resolver<'_> {
         frame.diffuse.resize(size(Aov::Diffuse), [0.0; 3]);
         frame.specular.resize(size(Aov::Specular), [0.0; 3]);
         frame.emission.resize(size(Aov::Emission), [0.0; 3]);
-        let counts = self.shade(buffer, frame, window.width as usize);
+        let counts = match self.settings.aa {
+            ..2 => self.shade(buffer, frame),
+            _ => self.shade_subpixels(buffer, antialias, frame),
+        };
 
         fill(&mut frame.depth, size(Aov::Depth), |i| finite_depth(buffer.z[i]));
         fill(&mut frame.class, size(Aov::Class), |i| buffer.class[i] as u8);
@@ -84,10 +104,11 @@ impl Resolver<'_> {
         let gain = self.settings.exposure.exp2();
         for (number, (name, layer)) in frame.lights.iter_mut().enumerate() {
             name.clone_from(&self.scene.lights[number].name);
-            fill(layer, pixels, |i| {
-                self.on_surface(buffer, i, |s| {
+            fill(layer, pixels, |i| match self.settings.aa {
+                ..2 => self.on_surface(buffer, i, |s| {
                     self.tracer.light_diffuse(&self.eye, s, buffer.lit(i), number) * gain
-                })
+                }),
+                _ => self.mean_light(buffer, antialias, i, number).map(|value| value * gain),
             });
         }
         self.fill_mattes(buffer, &mut frame.mattes);
@@ -113,15 +134,26 @@ impl Resolver<'_> {
         });
     }
 
-    fn shade(&self, buffer: &BuzzBuffer, frame: &mut Frame, width: usize) -> RayCounts {
-        let shade_row = |y: usize, row: Row<'_>| {
+    fn shade(&self, buffer: &BuzzBuffer, frame: &mut Frame) -> RayCounts {
+        self.fill_rows(frame, buffer.width(), |i, counts| {
+            self.pixel(&self.eye, &buffer.sample(i), buffer.lit(i), counts)
+        })
+    }
+
+    /// Fills the layers that come from shading, row by row.
+    pub(super) fn fill_rows(
+        &self,
+        frame: &mut Frame,
+        width: usize,
+        value: impl Fn(usize, &mut RayCounts) -> Pixel + Sync,
+    ) -> RayCounts {
+        let fill_row = |y: usize, row: Row<'_>| {
             let mut counts = RayCounts::default();
             if self.observer.stop_requested().is_some() {
                 return counts;
             }
             for (x, color) in row.color.iter_mut().enumerate() {
-                let i = y * width + x;
-                let pixel = self.pixel(&buffer.sample(i), buffer.lit(i), &mut counts);
+                let pixel = value(y * width + x, &mut counts);
                 *color = pixel.color;
                 for (layer, value) in [
                     (&mut *row.diffuse, pixel.diffuse),
@@ -136,21 +168,31 @@ impl Resolver<'_> {
             counts
         };
         let rows: Vec<Row<'_>> = rows(frame, width);
-        rows.into_par_iter().enumerate().map(|(y, row)| shade_row(y, row)).sum()
+        rows.into_par_iter().enumerate().map(|(y, row)| fill_row(y, row)).sum()
     }
 
-    fn pixel(&self, sample: &SurfaceSample, lit: &[u32], counts: &mut RayCounts) -> Pixel {
-        let radiance = self.tracer.shade(&self.eye, sample, lit, counts);
+    /// Shades a sample of a pixel or sub-pixel as wide as `eye` has them, unless the user asked to stop.
+    pub(super) fn shade_sample(
+        &self,
+        eye: &Eye,
+        sample: &SurfaceSample,
+        lit: &[u32],
+        pixel: &mut Pixel,
+    ) -> RayCounts {
+        let mut counts = RayCounts::default();
+        if self.observer.stop_requested().is_none() {
+            *pixel = self.pixel(eye, sample, lit, &mut counts);
+        }
+        counts
+    }
+
+    fn pixel(&self, eye: &Eye, sample: &SurfaceSample, lit: &[u32], counts: &mut RayCounts) -> Pixel {
+        let radiance = self.tracer.shade(eye, sample, lit, counts);
         let gain = self.settings.exposure.exp2();
         let (diffuse, specular, emission) =
             (radiance.diffuse * gain, radiance.specular * gain, radiance.emission * gain);
         if sample.surface.is_background() && self.settings.transparent {
-            return Pixel {
-                color: [0.0; 4],
-                diffuse: Vec3::ZERO,
-                specular: Vec3::ZERO,
-                emission: Vec3::ZERO,
-            };
+            return Pixel::default();
         }
         let rgb = diffuse + specular + emission;
         Pixel { color: rgb.extend(radiance.alpha).to_array(), diffuse, specular, emission }
@@ -235,7 +277,11 @@ pub(super) fn count_hidden(
         let asked = buffer.class[i].is_reused() && observer.stop_requested().is_none();
         asked && tracer.is_hidden(&eye, &buffer.sample(i))
     };
-    pixels.filter(hidden).count() as u64
+    let finer = buffer.finer.levels.iter().flat_map(|level| level.samples.iter().zip(&level.reused));
+    let is_hidden = |&(sample, &reused): &(&SurfaceSample, &bool)| {
+        reused && observer.stop_requested().is_none() && tracer.is_hidden(&eye, sample)
+    };
+    (pixels.filter(hidden).count() + finer.par_bridge().filter(is_hidden).count()) as u64
 }
 
 /// A frame without pixels.

@@ -22,7 +22,7 @@ impl Emitter<'_> {
         }
         let shot = shot_of(Some(StereoEye::Right), self.scene, self.settings, left_shot.frame);
         let stats = if self.settings.quality == Quality::Full {
-            self.trace(tracer, &shot, right)
+            self.trace(tracer, &shot, right, inference)
         } else {
             // Between the eyes of a frame nothing moves.
             let caster = self.caster(tracer, &shot, None);

@@ -34,6 +34,12 @@ impl Eye {
         }
     }
 
+    /// The same eye with beams as wide as sub-pixels, of which there are 2^level to a pixel's side.
+    #[must_use]
+    pub fn finer(&self, level: usize) -> Self {
+        Self { pixel: self.pixel / (1u32 << level) as f32, ..*self }
+    }
+
     /// The ray through raster position (x, y), from the near plane to the far plane; its parameter is planar depth.
     pub(super) fn ray(&self, accel: &Accel, x: f64, y: f64) -> Ray {
         let ray = self.view.ray_within(self.half_extent, x, y);

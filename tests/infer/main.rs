@@ -8,3 +8,4 @@ mod half_pixel;
 mod moved;
 mod rig;
 mod stereo;
+mod supersample;

@@ -67,7 +67,7 @@ const LIGHT: DVec3 = DVec3::new(2.0, 5.0, 0.0);
 
 impl Spheres {
     /// What the ray meets if nothing is there but the surface of `object`.
-    fn trace_only(&self, object: u32, origin: DVec3, direction: DVec3) -> Option<SurfaceSample> {
+    pub fn trace_only(&self, object: u32, origin: DVec3, direction: DVec3) -> Option<SurfaceSample> {
         let mut alone = self.clone();
         for (i, sphere) in alone.0.iter_mut().enumerate() {
             if i as u32 + 2 != object {

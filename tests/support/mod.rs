@@ -2,7 +2,9 @@
 
 #![allow(dead_code)] // Not every test uses everything.
 
-use buzz::frame::{Frame, FrameKind, FrameStats, Matte, PixelClass, RayCounts, StageSeconds, Window};
+use buzz::frame::{
+    Frame, FrameKind, FrameStats, Matte, PixelClass, RayCounts, StageSeconds, SubPixelCounts, Window,
+};
 use buzz::output::{Compression, FileOptions, SettingsHash, SettingsHasher};
 use buzz::scene::{Lens, Projection, Rational, View};
 use glam::{DVec2, DVec3};
@@ -83,6 +85,7 @@ pub fn frame(number: i64, kind: FrameKind, shape: &Shape) -> Frame {
             .to_vec(),
         stats: FrameStats {
             pixels,
+            subpixels: SubPixelCounts { sampled: 7, reused: 6, wasted: 5 },
             rays: RayCounts {
                 primary: n as u64,
                 shadow: 12,

@@ -90,11 +90,24 @@ impl Report {
                 ),
             ),
         ];
-        if let Some(hidden) = totals.hidden {
+        let subpixels = totals.subpixels;
+        if !subpixels.is_empty() {
             rows.push((
-                "Hidden samples",
-                format!("{} of {} reused ({})", grouped(hidden), grouped(reused), percent(hidden, reused)),
+                "Sub-pixels",
+                format!(
+                    "{} beside the centres, {} of them reused ({}); {} landed for nothing",
+                    grouped(subpixels.sampled),
+                    grouped(subpixels.reused),
+                    percent(subpixels.reused, subpixels.sampled),
+                    grouped(subpixels.wasted)
+                ),
             ));
+        }
+        if let Some(hidden) = totals.hidden {
+            rows.push(("Hidden samples", {
+                let reused = reused + subpixels.reused;
+                format!("{} of {} reused ({})", grouped(hidden), grouped(reused), percent(hidden, reused))
+            }));
         }
         let rows: String =
             rows.iter().map(|(name, value)| format!("<dt>{name}</dt><dd>{value}</dd>")).collect();
