@@ -131,8 +131,9 @@ def write(resolution: str, measured: list[list[str]], chains: list[list[str]], s
     """Writes docs/trade.md as far as it is known: after each scene, so that a run that is stopped leaves something."""
     commit = run("git", "-C", str(ROOT), "rev-parse", "--short", "HEAD").strip()
     machine = f"{len(os.sched_getaffinity(0))} cores of {processor()}"
+    scenes = " ".join(dict.fromkeys(row[0] for row in measured))
     parts = [
-        HEAD.format(commit=commit, machine=machine, resolution=resolution, noise=100 * noise),
+        HEAD.format(commit=commit, machine=machine, resolution=resolution, scenes=scenes, noise=100 * noise),
         table(TITLES, measured),
         MIDDLE,
         table(["scene", "quality", *map(str, DISTANCES)], chains),
@@ -143,8 +144,8 @@ def write(resolution: str, measured: list[list[str]], chains: list[list[str]], s
 
 HEAD = """# What each quality costs
 
-Written by `.venv/bin/python scenes/trade.py OUT --resolution {resolution}`: `buzz-convert trade` on each scene ([what
-it does](review.md#trade)), commit {commit}, {machine}. Every frame was rendered twice, the qualities in turn; the
+Written by `.venv/bin/python scenes/trade.py OUT --resolution {resolution} {scenes}`: `buzz-convert trade`
+on each scene ([what it does](review.md#trade)), commit {commit}, {machine}. Every frame was rendered twice, the qualities in turn; the
 slower round took up to {noise:.0f} % longer (median over frames, noisiest scene and quality).
 
 *ms a frame* is without writing, key frames counted in. *Times as fast* is against `full`. *Hidden* is the share of
