@@ -145,8 +145,9 @@ def write(resolution: str, measured: list[list[str]], chains: list[list[str]], s
 HEAD = """# What each quality costs
 
 Written by `.venv/bin/python scenes/trade.py OUT --resolution {resolution} {scenes}`: `buzz-convert trade`
-on each scene ([what it does](review.md#trade)), commit {commit}, {machine}. Every frame was rendered twice, the qualities in turn; the
-slower round took up to {noise:.0f} % longer (median over frames, noisiest scene and quality).
+on each scene ([what it does](review.md#trade)), commit {commit}, {machine}. Every frame was rendered
+twice, the qualities in turn; the slower round took up to {noise:.0f} % longer (median over frames, noisiest scene and
+quality).
 
 *ms a frame* is without writing, key frames counted in. *Times as fast* is against `full`. *Hidden* is the share of
 reused samples that another surface hides. PSNR, FLIP and *over 5 %* are of frames that are not identical to the
