@@ -60,43 +60,24 @@ impl<'a> SurfacePoint<'a> {
         let material = &scene.materials[mesh.material];
         let placement = accel.placement(index);
         let m = &placement.render_from_object;
+        let (corners, weights, edges, position, outward, magnitude);
         if let Some(shape) = &mesh.shape {
             let (local, _) = shape.point(surface);
-            let position = m.transform_point3(local);
-            let outward = accel.shape_normal(scene, surface).unwrap_or(Vec3::Y);
-            let front = side.is_front(outward);
-            let geometric = if front { outward } else { -outward };
-            let magnitude = local.abs().into();
-            let (corners, weights, edges) = ([0; 3], [0.0; 3], [Vec3::ZERO; 2]);
-            return Self {
-                mesh,
-                material,
-                corners,
-                weights,
-                edges,
-                position,
-                geometric,
-                front,
-                placement,
-                magnitude,
-                offset: OnceCell::new(),
-                surface,
-            };
+            (corners, weights, edges) = ([0; 3], [0.0; 3], [Vec3::ZERO; 2]);
+            position = m.transform_point3(local);
+            outward = accel.shape_normal(scene, surface).unwrap_or(Vec3::Y);
+            magnitude = local.abs().into();
+        } else {
+            corners = mesh.triangles[surface.primitive as usize].map(|i| i as usize);
+            let positions = accel.positions(index, mesh);
+            let [a, b, c] = corners.map(|i| Vec3A::from(positions[i]));
+            weights = [1.0 - surface.u - surface.v, surface.u, surface.v];
+            position = m.transform_point3a(interpolate(a, b, c, surface)).into();
+            edges = [b - a, c - a].map(|e| Vec3::from(m.transform_vector3a(e)));
+            outward = edges[0].cross(edges[1]).normalize_or(Vec3::Y) * placement.winding;
+            magnitude = a.abs() * weights[0] + b.abs() * weights[1] + c.abs() * weights[2];
         }
-        let corners = mesh.triangles[surface.primitive as usize].map(|i| i as usize);
-        let positions = accel.positions(index, mesh);
-        let [a, b, c] = corners.map(|i| Vec3A::from(positions[i]));
-        let weights = [1.0 - surface.u - surface.v, surface.u, surface.v];
-
-        let position: Vec3 = m.transform_point3a(interpolate(a, b, c, surface)).into();
-        let edges = [b - a, c - a].map(|e| Vec3::from(m.transform_vector3a(e)));
-        let cross = edges[0].cross(edges[1]);
-        let outward = cross.normalize_or(Vec3::Y) * placement.winding;
         let front = side.is_front(outward);
-        let geometric = if front { outward } else { -outward };
-
-        let magnitude = a.abs() * weights[0] + b.abs() * weights[1] + c.abs() * weights[2];
-        let offset = OnceCell::new();
         Self {
             mesh,
             material,
@@ -104,11 +85,11 @@ impl<'a> SurfacePoint<'a> {
             weights,
             edges,
             position,
-            geometric,
+            geometric: if front { outward } else { -outward },
             front,
             placement,
             magnitude,
-            offset,
+            offset: OnceCell::new(),
             surface,
         }
     }

@@ -14,7 +14,7 @@ fn differing(scene: &crate::rig::Spheres, view: &View, buffer: &BuzzBuffer) -> (
     let (mut objects, mut lights) = (0, 0);
     for i in 0..buffer.class.len() {
         let mut lit = [0];
-        let truth = Eye(scene, view).cast(i % 48, i / 48, &mut lit, &mut RayCounts::default());
+        let truth = Eye::of(scene, view).cast(i % 48, i / 48, &mut lit, &mut RayCounts::default());
         objects += usize::from(buffer.object[i] != truth.object);
         lights += usize::from(buffer.object[i] == truth.object && buffer.lit(i) != lit);
     }

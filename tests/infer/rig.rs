@@ -1,7 +1,7 @@
 //! Scenes of spheres over a ground plane, under one light, whose answers a closed form knows.
 
 use buzz::frame::{PackedNormal, PixelClass, RayCounts, SurfaceRef, SurfaceSample};
-use buzz::infer::{BuzzBuffer, CastCentres, CastRays, Inference, Move, Projector, Trust};
+use buzz::infer::{BuzzBuffer, CastCentres, CastRays, Inference, Lattice, Move, Projector, Trust};
 use buzz::scene::{Lens, Projection, View};
 use glam::{DMat3, DVec2, DVec3};
 use proptest::prelude::*;
@@ -90,12 +90,18 @@ impl Spheres {
     }
 }
 
-/// The eye of a view among spheres.
-pub struct Eye<'a>(pub &'a Spheres, pub &'a View);
+/// The eye of a view among spheres; asked by pixels, or by the positions of a lattice.
+pub struct Eye<'a>(pub &'a Spheres, pub &'a View, pub Option<Lattice>);
 
-impl Eye<'_> {
+impl<'a> Eye<'a> {
+    /// One that is asked by pixels.
+    pub fn of(scene: &'a Spheres, view: &'a View) -> Self {
+        Self(scene, view, None)
+    }
+
     fn ray(&self, x: usize, y: usize) -> (DVec3, DVec3) {
-        let ray = self.1.ray(x as f64 + 0.5, y as f64 + 0.5);
+        let place = |at: usize| self.2.map_or(at as f64 + 0.5, |lattice| lattice.to_raster(at as u32));
+        let ray = self.1.ray(place(x), place(y));
         (ray.origin, ray.direction)
     }
 }
@@ -130,9 +136,10 @@ impl CastCentres for Eye<'_> {
         candidates: impl Iterator<Item = SurfaceSample>,
     ) -> Option<SurfaceSample> {
         let (origin, direction) = self.ray(x, y);
-        candidates
-            .filter_map(|c| self.0.trace_only(c.object, origin, direction))
-            .min_by(|a, b| a.position.length().total_cmp(&b.position.length()))
+        candidates.filter_map(|c| self.0.trace_only(c.object, origin, direction)).min_by(|a, b| {
+            let far = |sample: &SurfaceSample| (sample.position.as_dvec3() - origin).length();
+            far(a).total_cmp(&far(b))
+        })
     }
 
     fn is_hidden(&self, sample: &SurfaceSample, counts: &mut RayCounts) -> bool {
@@ -196,11 +203,11 @@ pub fn chain(
 ) -> Result<(), TestCaseError> {
     let mut from = camera(DVec3::ZERO, 0.0);
     let (mut old, mut new) = (BuzzBuffer::new(48, 32, 1), BuzzBuffer::new(48, 32, 1));
-    old.cast_unknown(&Projector::new(&from, DVec3::ZERO), &Eye(scene, &from));
+    old.cast_unknown(&Projector::new(&from, DVec3::ZERO), &Eye::of(scene, &from));
     let mut inference = Inference::default();
     for i in 1..=steps {
         let to = camera(step * i as f64, turn * i as f64);
-        let (source, target, rays) = ((&old, &from), (&mut new, &to), Eye(scene, &to));
+        let (source, target, rays) = ((&old, &from), (&mut new, &to), Eye::of(scene, &to));
         let cost = match trust {
             None => inference.infer(Move::Camera, source, target, DVec3::ZERO, &rays),
             Some(trust) => inference.infer_centred(Move::Camera, source, target, DVec3::ZERO, trust, &rays),

@@ -12,8 +12,8 @@ fn pair(scene: &Spheres, stereo: Stereo, trust: Option<Trust>) -> (View, BuzzBuf
     let middle = camera(DVec3::ZERO, 0.1);
     let (from, to) = (middle.of_eye(stereo, StereoEye::Left), middle.of_eye(stereo, StereoEye::Right));
     let (mut left, mut right) = (BuzzBuffer::new(48, 32, 1), BuzzBuffer::new(48, 32, 1));
-    left.cast_unknown(&Projector::new(&from, DVec3::ZERO), &Eye(scene, &from));
-    let (source, target, rays) = ((&left, &from), (&mut right, &to), Eye(scene, &to));
+    left.cast_unknown(&Projector::new(&from, DVec3::ZERO), &Eye::of(scene, &from));
+    let (source, target, rays) = ((&left, &from), (&mut right, &to), Eye::of(scene, &to));
     let mut inference = Inference::default();
     let cost = match trust {
         None => inference.infer(Move::OtherEye, source, target, DVec3::ZERO, &rays),
@@ -45,7 +45,7 @@ proptest! {
     #[test]
     fn a_centred_eye_sees_what_rays_see(scene in spheres(), stereo in stereo()) {
         let (view, right, rays) = pair(&scene, stereo, Some(Trust::Neighbours));
-        let (truth, mut lit) = (Eye(&scene, &view), [0]);
+        let (truth, mut lit) = (Eye::of(&scene, &view), [0]);
         let wrong = (0..right.class.len()).filter(|&i| {
             let seen = truth.cast(i % 48, i / 48, &mut lit, &mut RayCounts::default());
             seen.object != right.object[i] || seen.position.distance(right.position[i]) > 1e-3 * right.z[i]

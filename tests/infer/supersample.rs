@@ -1,8 +1,8 @@
 //! What super-sampling promises: sub-pixels where samples differ, carried on where they can be, each in its place.
 
-use crate::rig::{Eye, Spheres, camera, four_spheres, is_hidden, small_step, spheres};
+use crate::rig::{Eye, Spheres, camera, four_spheres, small_step, spheres};
 use buzz::frame::{RayCounts, SubPixelCounts, SurfaceSample};
-use buzz::infer::{BuzzBuffer, CastCentres, CastRays, Inference, Lattice, Move, Position, Projector, Trust};
+use buzz::infer::{BuzzBuffer, CastCentres, Inference, Move, Position, Projector, Trust};
 use buzz::scene::View;
 use glam::DVec3;
 use proptest::prelude::*;
@@ -10,74 +10,17 @@ use proptest::prelude::*;
 /// Three: five positions along the side of a pixel.
 const LEVELS: u32 = 3;
 
-/// The eye of a view, asked by positions of a lattice.
-struct FineEye<'a> {
-    scene: &'a Spheres,
-    view: &'a View,
-    lattice: Lattice,
+/// What the ray through a position finds.
+fn truth(fine: &Eye<'_>, [x, y]: Position) -> SurfaceSample {
+    fine.hit(x as usize, y as usize, &mut RayCounts::default())
 }
 
-impl FineEye<'_> {
-    fn ray(&self, x: usize, y: usize) -> (DVec3, DVec3) {
-        let [x, y] = [x, y].map(|at| self.lattice.to_raster(at as u32));
-        let ray = self.view.ray(x, y);
-        (ray.origin, ray.direction)
-    }
-
-    fn eye(&self) -> Eye<'_> {
-        Eye(self.scene, self.view)
-    }
-
-    /// What the ray through a position finds.
-    fn truth(&self, [x, y]: Position) -> SurfaceSample {
-        self.hit(x as usize, y as usize, &mut RayCounts::default())
-    }
-
-    /// How far from a position a sample lies, in pixels: the larger of both directions.
-    fn off(&self, sample: &SurfaceSample, at: Position) -> f64 {
-        let w = if sample.surface.is_background() { 0.0 } else { 1.0 };
-        let r = self.view.raster_from_world(DVec3::ZERO) * sample.position.as_dvec3().extend(w);
-        let [x, y] = at.map(|c| self.lattice.to_raster(c));
-        (r.x / r.w - x).abs().max((r.y / r.w - y).abs())
-    }
-}
-
-impl CastRays for FineEye<'_> {
-    fn cast(&self, x: usize, y: usize, lit: &mut [u32], counts: &mut RayCounts) -> SurfaceSample {
-        let sample = self.hit(x, y, counts);
-        self.recast(&sample, &[1], lit, counts);
-        sample
-    }
-}
-
-impl CastCentres for FineEye<'_> {
-    fn hit(&self, x: usize, y: usize, counts: &mut RayCounts) -> SurfaceSample {
-        counts.primary += 1;
-        let (origin, direction) = self.ray(x, y);
-        self.scene.trace(origin, direction)
-    }
-
-    fn recast(&self, sample: &SurfaceSample, ask: &[u32], lit: &mut [u32], counts: &mut RayCounts) {
-        self.eye().recast(sample, ask, lit, counts);
-    }
-
-    fn nearest_of(
-        &self,
-        x: usize,
-        y: usize,
-        candidates: impl Iterator<Item = SurfaceSample>,
-    ) -> Option<SurfaceSample> {
-        let (origin, direction) = self.ray(x, y);
-        let met = candidates.filter_map(|c| self.scene.trace_only(c.object, origin, direction));
-        met.min_by(|a, b| {
-            (a.position.as_dvec3() - origin).length().total_cmp(&(b.position.as_dvec3() - origin).length())
-        })
-    }
-
-    fn is_hidden(&self, sample: &SurfaceSample, counts: &mut RayCounts) -> bool {
-        counts.visibility += 1;
-        is_hidden(self.scene, self.view, sample)
-    }
+/// How far from a position a sample lies, in pixels: the larger of both directions.
+fn off(Eye(_, view, lattice): &Eye<'_>, sample: &SurfaceSample, at: Position) -> f64 {
+    let w = if sample.surface.is_background() { 0.0 } else { 1.0 };
+    let r = view.raster_from_world(DVec3::ZERO) * sample.position.as_dvec3().extend(w);
+    let [x, y] = at.map(|c| lattice.unwrap().to_raster(c));
+    (r.x / r.w - x).abs().max((r.y / r.w - y).abs())
 }
 
 /// A key frame with sub-pixels.
@@ -88,8 +31,8 @@ fn traced(
 ) -> (BuzzBuffer, RayCounts, SubPixelCounts) {
     let (width, height) = (view.width as usize, view.height as usize);
     let mut buffer = BuzzBuffer::new(width, height, 1).with_levels(LEVELS);
-    let rays = buffer.cast_unknown(&Projector::new(view, DVec3::ZERO), &Eye(scene, view));
-    let fine = FineEye { scene, view, lattice: buffer.finer.lattice() };
+    let rays = buffer.cast_unknown(&Projector::new(view, DVec3::ZERO), &Eye::of(scene, view));
+    let fine = Eye(scene, view, Some(buffer.finer.lattice()));
     let (cost, counts) = inference.trace_subpixels(&mut buffer, view, DVec3::ZERO, &fine);
     (buffer, [rays, cost.rays].into_iter().sum(), counts)
 }
@@ -100,7 +43,7 @@ fn chain(
     trust: Option<Trust>,
     (step, turn): (DVec3, f64),
     steps: usize,
-    mut check: impl FnMut(&FineEye<'_>, &BuzzBuffer, RayCounts, SubPixelCounts) -> Result<(), TestCaseError>,
+    mut check: impl FnMut(&Eye<'_>, &BuzzBuffer, RayCounts, SubPixelCounts) -> Result<(), TestCaseError>,
 ) -> Result<(), TestCaseError> {
     let mut inference = Inference::default();
     let mut from = camera(DVec3::ZERO, 0.0);
@@ -108,12 +51,12 @@ fn chain(
     let mut new = old.clone();
     for i in 1..=steps {
         let to = camera(step * i as f64, turn * i as f64);
-        let (source, target, rays) = ((&old, &from), (&mut new, &to), Eye(scene, &to));
+        let (source, target, rays) = ((&old, &from), (&mut new, &to), Eye::of(scene, &to));
         match trust {
             None => inference.infer(Move::Camera, source, target, DVec3::ZERO, &rays),
             Some(trust) => inference.infer_centred(Move::Camera, source, target, DVec3::ZERO, trust, &rays),
         };
-        let fine = FineEye { scene, view: &to, lattice: new.finer.lattice() };
+        let fine = Eye(scene, &to, Some(new.finer.lattice()));
         let (cost, counts) = inference.infer_subpixels(&old, &mut new, &to, DVec3::ZERO, trust, &fine);
         check(&fine, &new, cost.rays, counts)?;
         std::mem::swap(&mut old, &mut new);
@@ -146,11 +89,11 @@ fn sub_pixels_are_finest_along_outlines() {
     assert_eq!(rays.primary, 48 * 32 + counts.sampled);
     assert_eq!((counts.reused, counts.wasted), (0, 0));
     // An outline cuts the image in two: somewhere on either side of each of the finest sub-pixels it changes.
-    let fine = FineEye { scene: &scene, view: &view, lattice: buffer.finer.lattice() };
+    let fine = Eye(&scene, &view, Some(buffer.finer.lattice()));
     let finest = buffer.finer.levels[1].cells.positions();
     assert!(finest.len() > 400, "{}", finest.len());
     let tag = |[x, y]: Position, dx: i32, dy: i32| {
-        let sample = fine.truth([x.saturating_add_signed(dx), y.saturating_add_signed(dy)]);
+        let sample = truth(&fine, [x.saturating_add_signed(dx), y.saturating_add_signed(dy)]);
         (sample.object, scene.lit(&sample) == Some(true))
     };
     let near = |&&at: &&Position| (-2..=2).any(|dy| (-2..=2).any(|dx| tag(at, dx, dy) != tag(at, 0, 0)));
@@ -182,7 +125,7 @@ fn outlines_move_before_what_stands_still() {
         (DVec3::new(0.0015, 0.0, 0.0), 0.0),
         60,
         |fine, buffer, _, counts| {
-            let wrong = subpixels(buffer).filter(|(at, s, _)| s.object != fine.truth(*at).object).count();
+            let wrong = subpixels(buffer).filter(|(at, s, _)| s.object != truth(fine, *at).object).count();
             last = wrong as f64 / counts.sampled as f64;
             Ok(())
         },
@@ -199,7 +142,7 @@ proptest! {
     fn what_is_reused_lies_within_half_a_sub_pixel(scene in spheres(), step in small_step(), turn in -0.02..0.02f64) {
         chain(&scene, None, (step, turn), 6, |fine, buffer, _, _| {
             for (at, sample, reused) in subpixels(buffer) {
-                let off = fine.off(&sample, at);
+                let off = off(fine, &sample, at);
                 prop_assert!(off <= if reused { 0.125 + 1e-3 } else { 1e-3 }, "{:?} {} {}", at, reused, off);
             }
             Ok(())
@@ -212,9 +155,9 @@ proptest! {
         let (mut wrong, mut all) = (0, 0);
         chain(&scene, Some(Trust::Neighbours), (step, turn), 6, |fine, buffer, _, counts| {
             for (at, sample, _) in subpixels(buffer) {
-                let off = fine.off(&sample, at);
+                let off = off(fine, &sample, at);
                 prop_assert!(off <= 1.0 / 256.0 + 1e-3, "{:?} {}", at, off);
-                wrong += usize::from(sample.object != fine.truth(at).object);
+                wrong += usize::from(sample.object != truth(fine, at).object);
             }
             all += counts.sampled as usize;
             Ok(())

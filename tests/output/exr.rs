@@ -5,7 +5,7 @@ use buzz::frame::{Frame, FrameKind, Window};
 use buzz::output::exr::encode;
 use buzz::output::{Compression, ExrSink, FrameFile, NamePattern, OutputFolder, SettingsHasher};
 use buzz::sequence::FrameSink;
-use exr::prelude::{FlatSamples, ReadChannels, ReadLayers};
+use exr::prelude::{AnyChannels, FlatSamples, Image, Layer, ReadChannels, ReadLayers};
 use serde_json::{Value, json};
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -98,19 +98,24 @@ fn cases() -> Vec<(&'static str, Frame, Compression)> {
     all
 }
 
+/// A file's only layer, as the `exr` crate reads it.
+fn read(bytes: Vec<u8>) -> Image<Layer<AnyChannels<FlatSamples>>> {
+    exr::prelude::read()
+        .no_deep_data()
+        .largest_resolution_level()
+        .all_channels()
+        .first_valid_layer()
+        .all_attributes()
+        .non_parallel()
+        .from_buffered(std::io::Cursor::new(bytes))
+        .unwrap()
+}
+
 #[test]
 fn the_exr_crate_reads_back_what_was_written() {
     for (name, frame, compression) in cases() {
         let bytes = bytes_of(&frame, compression);
-        let image = exr::prelude::read()
-            .no_deep_data()
-            .largest_resolution_level()
-            .all_channels()
-            .first_valid_layer()
-            .all_attributes()
-            .non_parallel()
-            .from_buffered(std::io::Cursor::new(bytes))
-            .unwrap();
+        let image = read(bytes);
         let layer = &image.layer_data;
         let expected = expected_channels(&frame);
         assert_eq!(layer.channel_data.list.len(), expected.len(), "{name}");
@@ -245,14 +250,7 @@ fn no_nan_and_no_infinity_is_written() {
     frame.depth = vec![f32::NAN, f32::INFINITY, f32::NEG_INFINITY, f32::MAX];
     let encoded = encode(&frame, &options(Compression::Zip)).unwrap();
     assert_eq!(encoded.repaired, 7);
-    let image = exr::prelude::read()
-        .no_deep_data()
-        .largest_resolution_level()
-        .all_channels()
-        .first_valid_layer()
-        .all_attributes()
-        .from_buffered(std::io::Cursor::new(encoded.parts.concat()))
-        .unwrap();
+    let image = read(encoded.parts.concat());
     let values = |name: &str| {
         let channels = &image.layer_data.channel_data.list;
         channels.iter().find(|c| c.name.eq(name)).unwrap().sample_data.values_as_f32().collect::<Vec<_>>()
