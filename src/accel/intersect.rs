@@ -3,9 +3,9 @@
 use super::opacity::{self, CULL_BACK, EYE_PASS, EYE_TEST, MIRRORED, SHADOW_PASS, SHADOW_TEST};
 use super::placed_shape::PlacedShape;
 use super::tree::Bounds;
-use super::triangle::{ShearedRay, TreeTriangle, TriangleHit, TrianglePack};
+use super::triangle::{ShearedRay, TriangleHit};
 use super::wide::{Pending, SlabRay};
-use super::{Accel, Placed, PlacedTree};
+use super::{Accel, KnownTriangle, Placed, PlacedTree};
 use crate::frame::SurfaceRef;
 use crate::scene::{Mesh, Scene};
 use glam::Vec3;
@@ -111,8 +111,15 @@ impl Accel {
     }
 
     /// Where a ray meets one known triangle, if it does, holes cut by alpha considered. Which side it meets does not
-    /// matter; nothing else is looked at. Of a known shape, the nearest point that the eye would see is met.
-    pub fn meet(&self, scene: &Scene, ray: &PreparedRay, surface: SurfaceRef) -> Option<RayHit> {
+    /// matter; nothing else is looked at. Of a known shape, the nearest point that the eye would see is met. `known` is the
+    /// triangle that was asked for before, and becomes this one.
+    pub fn meet(
+        &self,
+        scene: &Scene,
+        ray: &PreparedRay,
+        surface: SurfaceRef,
+        known: &mut KnownTriangle,
+    ) -> Option<RayHit> {
         let PreparedRay { ray, sheared } = ray;
         let index = surface.instance as usize;
         let mesh = &scene.meshes[scene.instances[index].mesh];
@@ -122,17 +129,12 @@ impl Accel {
             let ray = LocalRay { origin, direction, t_min };
             return shape.meet(scene, &ray, t_max, Sides::Visible);
         }
-        let positions = self.positions(index, mesh);
-        let m = &self.placement(index).render_from_object;
-        let corners = mesh.triangles[surface.primitive as usize]
-            .map(|i| Vec3::from(m.transform_point3a(positions[i as usize].into())));
-        let triangle = TreeTriangle { corners, primitive: surface.primitive, part: 0, flags: 0 };
-        let pack = TrianglePack::new([triangle].iter());
-        let (_, hit) = sheared.intersect(&pack, ray.t_min, ray.t_max).next()?;
-        let present = opacity::is_alpha_uniform(scene, mesh)
-            || opacity::is_present_at(scene, mesh, surface.primitive, hit.u, hit.v);
-        let front = hit.front ^ (self.placement(index).winding < 0.0);
-        present.then_some(RayHit { t: hit.t, surface: SurfaceRef { u: hit.u, v: hit.v, ..surface }, front })
+        known.learn(self, scene, mesh, surface);
+        let hit = known.meet(sheared, ray.t_min, ray.t_max)?;
+        let present =
+            !known.has_holes() || opacity::is_present_at(scene, mesh, surface.primitive, hit.u, hit.v);
+        let surface = SurfaceRef { u: hit.u, v: hit.v, ..surface };
+        present.then_some(RayHit { t: hit.t, surface, front: hit.front })
     }
 
     /// True if light passes from `from` along `direction` as far as `t_max` lengths of it: nothing there has an

@@ -4,7 +4,7 @@
 //! frame, where an edge's function is computed from its two vertices alone; two triangles that share the edge
 //! get exactly opposite values, so no ray slips between them. Zero counts as inside for both.
 
-use glam::{Vec3, Vec4};
+use glam::{BVec4A, Vec3, Vec4, Vec4Swizzles};
 
 /// A triangle, and what a hit on it needs to know.
 #[derive(Debug, Clone, Copy)]
@@ -157,6 +157,31 @@ impl ShearedRay {
         let met = inside & t.cmpge(Vec4::splat(t_min)) & t.cmple(Vec4::splat(t_max));
         let (u, v) = (wb * inverse, wc * inverse);
         PackHits { mask: met.bitmask(), t, u, v, front: sum.cmpgt(zero).bitmask() }
+    }
+}
+
+impl ShearedRay {
+    /// The hit on one triangle, of which each axis has the coordinates of all corners, with `t_min <= t <= t_max`:
+    /// to the last bit that of a pack.
+    #[inline]
+    pub fn meet(&self, corners: &[Vec4; 3], t_min: f32, t_max: f32) -> Option<TriangleHit> {
+        let [kx, ky, kz] = self.axes;
+        let [ox, oy, oz] = self.origin;
+        let [sx, sy, sz] = self.shear;
+        let z = corners[kz] - oz;
+        let (x, y) = (corners[kx] - ox - sx * z, corners[ky] - oy - sy * z);
+        let weights = x.zxyw() * y.yzxw() - y.zxyw() * x.yzxw();
+        let all = |lanes: BVec4A| lanes.bitmask() & 0b111 == 0b111;
+        let inside = all(weights.cmpge(Vec4::ZERO)) || all(weights.cmple(Vec4::ZERO));
+        let sum = weights.x + weights.y + weights.z;
+        if !inside || sum == 0.0 {
+            return None;
+        }
+        let inverse = 1.0 / sum;
+        let weighed = weights * z;
+        let t = (weighed.x + weighed.y + weighed.z) * inverse * sz.x;
+        let met = t >= t_min && t <= t_max;
+        met.then_some(TriangleHit { t, u: weights.y * inverse, v: weights.z * inverse, front: sum > 0.0 })
     }
 }
 

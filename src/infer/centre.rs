@@ -28,6 +28,9 @@ use rayon::prelude::*;
 
 /// What re-centring asks of the scene, beside whole rays: parts of one, and surfaces that are known already.
 pub trait CastCentres: CastRays {
+    /// What is worth remembering from one pixel to the next; it changes no answer.
+    type Memory: Default;
+
     /// The sample that the ray through the centre of pixel (x, y) finds; no light is asked for.
     fn hit(&self, x: usize, y: usize, counts: &mut RayCounts) -> SurfaceSample;
 
@@ -75,6 +78,7 @@ pub trait CastCentres: CastRays {
         x: usize,
         y: usize,
         candidates: impl Iterator<Item = SurfaceSample>,
+        memory: &mut Self::Memory,
     ) -> Option<SurfaceSample>;
 
     /// True if something hides the sample from the eye. Counted as `visibility`.
@@ -112,12 +116,12 @@ impl Centring {
     }
 
     /// Centres what can be centred without a ray. All other pixels are left unknown; their class says why.
-    pub fn recentre(
+    pub fn recentre<R: CastCentres>(
         &mut self,
         old: &BuzzBuffer,
         (landings, marks): (&Landings, &Marks),
         view: &Projector,
-        rays: &impl CastCentres,
+        rays: &R,
         trust: Trust,
         new: &mut BuzzBuffer,
     ) {
@@ -129,6 +133,7 @@ impl Centring {
         let rows = new.rows_mut().zip(self.ask.par_chunks_mut((width * words).max(1)));
         rows.enumerate().for_each(|(y, (mut row, ask))| {
             ask.fill(0);
+            let mut memory = R::Memory::default();
             for (x, alike) in sources.alike(old, y).enumerate() {
                 let (pixel, ask) = (y * width + x, &mut ask[x * words..][..words]);
                 let own = sources.of(pixel);
@@ -148,8 +153,8 @@ impl Centring {
                 // Within a triangle that is lit the same all around there is no more to find out.
                 if let Some(Alike { source, moved }) = alike {
                     let sample = old.sample(source);
-                    let centred =
-                        if moved { rays.nearest_of(x, y, std::iter::once(sample)) } else { Some(sample) };
+                    let mut centre = || rays.nearest_of(x, y, std::iter::once(sample), &mut memory);
+                    let centred = if moved { centre() } else { Some(sample) };
                     match centred {
                         Some(sample) => reuse(source, &sample),
                         None => row.class[x] = PixelClass::Edge,
@@ -166,7 +171,7 @@ impl Centring {
                 let nearby = || around.known().next().filter(|_| around.known().count() >= ENOUGH_TO_FILL);
                 let centred = own.or_else(nearby).and_then(|i| {
                     let triangles = around.one_surface(i)?;
-                    let sample = rays.nearest_of(x, y, triangles.iter().map(|k| old.sample(k)))?;
+                    let sample = rays.nearest_of(x, y, triangles.iter().map(|k| old.sample(k)), &mut memory)?;
                     Some((i, sample))
                 });
                 if let Some((i, sample)) = centred {

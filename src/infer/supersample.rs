@@ -334,7 +334,7 @@ impl<R: CastCentres> Carried<'_, R> {
         let front = around.front()?;
         let is_one = around.samples().all(|sample| is_one_surface(&front, &sample, view));
         let candidates = around.distinct().filter(|s| is_one || !s.surface.is_background());
-        let met = self.rays.nearest_of(at[0] as usize, at[1] as usize, candidates)?;
+        let met = self.rays.nearest_of(at[0] as usize, at[1] as usize, candidates, &mut R::Memory::default())?;
         (is_one || is_one_surface(&met, &front, view)).then_some(met)
     }
 

@@ -2,6 +2,7 @@
 
 use super::Observer;
 use super::motion::SceneMotion;
+use crate::accel::KnownTriangle;
 use crate::frame::{RayCounts, SurfaceSample};
 use crate::infer::{CastCentres, CastRays, Lattice, Motion};
 use crate::scene::View;
@@ -63,6 +64,8 @@ impl CastRays for Caster<'_> {
 }
 
 impl CastCentres for Caster<'_> {
+    type Memory = KnownTriangle;
+
     fn hit(&self, x: usize, y: usize, counts: &mut RayCounts) -> SurfaceSample {
         let (x, y) = self.place(x, y);
         self.tracer.hit(&self.eye, x, y, counts)
@@ -101,9 +104,10 @@ impl CastCentres for Caster<'_> {
         x: usize,
         y: usize,
         candidates: impl Iterator<Item = SurfaceSample>,
+        known: &mut KnownTriangle,
     ) -> Option<SurfaceSample> {
         let (x, y) = self.place(x, y);
-        self.tracer.nearest_of(&self.eye, x, y, candidates)
+        self.tracer.nearest_of(&self.eye, x, y, candidates, known)
     }
 
     fn is_hidden(&self, sample: &SurfaceSample, counts: &mut RayCounts) -> bool {

@@ -21,7 +21,7 @@ mod visibility;
 mod whitted;
 mod world;
 
-use crate::accel::{Accel, PreparedRay, Ray, Sides};
+use crate::accel::{Accel, KnownTriangle, PreparedRay, Ray, Sides};
 use crate::frame::{PackedNormal, RayCounts, SurfaceRef, SurfaceSample};
 use crate::scene::{Pose, Scene, View};
 pub use changes::LightChanges;
@@ -166,12 +166,14 @@ impl<'a> Tracer<'a> {
 
     /// What the ray through raster position (x, y) meets first if it can meet nothing but the triangles and shapes
     /// of `candidates`; no ray is cast into the scene, and none is counted. Where the candidates are the background, that.
+    /// `known` is remembered from one call to the next.
     pub fn nearest_of(
         &self,
         eye: &Eye,
         x: f64,
         y: f64,
         candidates: impl Iterator<Item = SurfaceSample>,
+        known: &mut KnownTriangle,
     ) -> Option<SurfaceSample> {
         let ray = eye.ray(self.accel, x, y);
         let mut prepared = PreparedRay::new(ray);
@@ -180,15 +182,18 @@ impl<'a> Tracer<'a> {
             if candidate.surface.is_background() {
                 return Some(SurfaceSample::background(ray.direction.normalize_or(Vec3::NEG_Z)));
             }
-            let Some(hit) = self.accel.meet(self.scene, &prepared, candidate.surface) else {
+            let Some(hit) = self.accel.meet(self.scene, &prepared, candidate.surface, known) else {
                 continue;
             };
             prepared.end_at(hit.t);
             nearest = Some((hit, candidate));
         }
         let (hit, candidate) = nearest?;
+        if let Some(position) = known.point(hit.surface) {
+            // A triangle looks the same way everywhere, as it was seen before.
+            return Some(SurfaceSample { position, surface: hit.surface, ..candidate });
+        }
         let position = self.accel.surface_point(self.scene, hit.surface);
-        // A triangle looks the same way everywhere, as it was seen before.
         let outward = self.accel.shape_normal(self.scene, hit.surface);
         let seen = outward.map(|n| PackedNormal::new(if hit.front { n } else { -n }));
         let normal = seen.unwrap_or(candidate.normal);

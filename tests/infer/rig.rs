@@ -115,6 +115,8 @@ impl CastRays for Eye<'_> {
 }
 
 impl CastCentres for Eye<'_> {
+    type Memory = ();
+
     fn hit(&self, x: usize, y: usize, counts: &mut RayCounts) -> SurfaceSample {
         counts.primary += 1;
         let (origin, direction) = self.ray(x, y);
@@ -134,6 +136,7 @@ impl CastCentres for Eye<'_> {
         x: usize,
         y: usize,
         candidates: impl Iterator<Item = SurfaceSample>,
+        (): &mut (),
     ) -> Option<SurfaceSample> {
         let (origin, direction) = self.ray(x, y);
         candidates.filter_map(|c| self.0.trace_only(c.object, origin, direction)).min_by(|a, b| {
