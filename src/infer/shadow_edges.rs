@@ -10,6 +10,7 @@ use super::buzz_buffer::{BuzzBuffer, Projector, pixels_around};
 use super::centre::CastCentres;
 use crate::frame::RayCounts;
 use rayon::prelude::*;
+use std::ops::Range;
 
 /// What following holds between frames, so that nothing is allocated for each.
 #[derive(Debug, Default)]
@@ -46,7 +47,12 @@ impl ShadowEdges {
                 let asked = &asked[pixel * words..][..words];
                 asked.iter().any(|&bits| bits != u32::MAX) && differs_around(buffer, *pixel)
             };
-            row.extend((y * width..(y + 1) * width).filter(wonders).map(|pixel| pixel as u32));
+            for first in (0..width).step_by(STRETCH) {
+                let stretch = y * width + first..y * width + (first + STRETCH).min(width);
+                if !is_even(buffer, &stretch) {
+                    row.extend(stretch.filter(wonders).map(|pixel| pixel as u32));
+                }
+            }
         });
         self.pixels.clear();
         self.rows.iter().for_each(|row| self.pixels.extend(row));
@@ -108,17 +114,26 @@ impl ShadowEdges {
     }
 }
 
+/// Pixels of a row that are looked at together; nearly everywhere they end there.
+const STRETCH: usize = 16;
+
+/// True if the pixels of a stretch within a row are inside the image and have the same shadow bits as all around them.
+fn is_even(buffer: &BuzzBuffer, stretch: &Range<usize>) -> bool {
+    let (width, height, words) = (buffer.width(), buffer.height(), buffer.lit_words());
+    let y = stretch.start / width;
+    let is_inside = y > 0 && y + 1 < height && stretch.start % width > 0 && stretch.end % width > 0;
+    is_inside && {
+        let row = |first: usize| &buffer.lit[(first - 1) * words..(first + stretch.len() + 1) * words];
+        let own = row(stretch.start);
+        own[words..] == own[..own.len() - words]
+            && own == row(stretch.start - width)
+            && own == row(stretch.start + width)
+    }
+}
+
 /// True where the shadow bits of a pixel differ from those of one around it.
 fn differs_around(buffer: &BuzzBuffer, pixel: usize) -> bool {
-    let (width, height, words) = (buffer.width(), buffer.height(), buffer.lit_words());
-    let (x, y, own) = (pixel % width, pixel / width, buffer.lit(pixel));
-    if x == 0 || y == 0 || x + 1 == width || y + 1 == height {
-        return pixels_around(width, height, pixel).any(|other| buffer.lit(other) != own);
-    }
-    // Nearly every pixel ends here, so three to a row.
-    let differs = |middle: usize| {
-        let three = &buffer.lit[(middle - 1) * words..(middle + 2) * words];
-        three.chunks_exact(words).any(|bits| !bits.iter().eq(own))
-    };
-    [pixel - width, pixel, pixel + width].into_iter().any(differs)
+    let (width, height) = (buffer.width(), buffer.height());
+    let own = buffer.lit(pixel);
+    pixels_around(width, height, pixel).any(|other| buffer.lit(other) != own)
 }
