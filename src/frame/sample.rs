@@ -61,22 +61,32 @@ impl SurfaceSample {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct PackedNormal(u32);
 
+/// Steps from the middle of the map to its side.
+const STEPS: f32 = 32767.0;
+
 impl PackedNormal {
     /// Packs a unit vector.
     pub fn new(n: Vec3) -> Self {
         let n = n / (n.x.abs() + n.y.abs() + n.z.abs()).max(f32::MIN_POSITIVE);
         let p = if n.z >= 0.0 { vec2(n.x, n.y) } else { fold(vec2(n.x, n.y)) };
-        let q = |x: f32| (x.clamp(-1.0, 1.0) * 32767.0).round() as i16 as u16;
+        let q = |x: f32| (x.clamp(-1.0, 1.0) * STEPS).round() as i16 as u16;
         Self(u32::from(q(p.x)) | u32::from(q(p.y)) << 16)
     }
 
     /// The unit vector.
     pub fn get(self) -> Vec3 {
-        let d = |x: u32| f32::from(x as u16 as i16) / 32767.0;
+        self.direction().normalize()
+    }
+
+    /// A vector of the same direction and of any length: all that is needed to tell sides apart.
+    #[inline]
+    pub fn direction(self) -> Vec3 {
+        let d = |x: u32| f32::from(x as u16 as i16);
         let p = vec2(d(self.0), d(self.0 >> 16));
-        let z = 1.0 - p.x.abs() - p.y.abs();
-        let p = if z >= 0.0 { p } else { fold(p) };
-        Vec3::new(p.x, p.y, z).normalize()
+        let z = STEPS - p.x.abs() - p.y.abs();
+        // Below, the point is mirrored across the diagonal of its quadrant.
+        let fold = (-z).max(0.0);
+        Vec3::new(p.x - fold.copysign(p.x), p.y - fold.copysign(p.y), z)
     }
 }
 

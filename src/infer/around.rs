@@ -29,16 +29,23 @@ pub enum Trust {
 /// Old pixels whose samples landed near one another, in rows from the top.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Nearby {
-    pixels: [u32; 25],
+    pixels: [u32; Self::MOST + 1],
     count: usize,
 }
 
 impl Nearby {
-    const NONE: Self = Self { pixels: [0; 25], count: 0 };
+    const MOST: usize = 25;
+    const NONE: Self = Self { pixels: [0; Self::MOST + 1], count: 0 };
 
     fn push(&mut self, i: usize) {
         self.pixels[self.count] = i as u32;
         self.count += 1;
+    }
+
+    /// Without a branch: there is room for one more than may be known.
+    fn push_if(&mut self, known: bool, i: u32) {
+        self.pixels[self.count] = i;
+        self.count += usize::from(known);
     }
 
     pub fn iter(&self) -> impl Iterator<Item = usize> + Clone {
@@ -68,18 +75,16 @@ impl<'a> Around<'a> {
     ) -> Self {
         let (width, height) = (old.width(), old.height());
         let (first, last) = (x.saturating_sub(reach), (x + reach).min(width - 1));
-        let mut this = Self { old, view, known: Nearby::NONE, size: 0, suspect: false, moved: false };
-        for y in y.saturating_sub(reach)..=(y + reach).min(height - 1) {
+        let rows = y.saturating_sub(reach)..=(y + reach).min(height - 1);
+        let size = rows.clone().count() * (last - first + 1);
+        let (mut known, mut flags) = (Nearby::NONE, 0);
+        for y in rows {
             for &source in sources.row(width, y, first..=last) {
-                this.size += 1;
-                this.suspect |= source & SUSPECT != 0;
-                this.moved |= source & MOVED != 0;
-                if source & NOTHING != NOTHING {
-                    this.known.push((source & NOTHING) as usize);
-                }
+                flags |= source;
+                known.push_if(source & NOTHING != NOTHING, source & NOTHING);
             }
         }
-        this
+        Self { old, view, known, size, suspect: flags & SUSPECT != 0, moved: flags & MOVED != 0 }
     }
 
     /// Old pixels whose samples are known here.
@@ -176,7 +181,10 @@ impl<'a> Tangent<'a> {
 
     /// True if `other` lies on the same surface and faces the same way: what light reaches one is likely to reach the other.
     pub fn may_lend(&self, other: &SurfaceSample) -> bool {
-        let faces_alike = || self.normal.dot(other.normal.get()) > SAME_FACING;
+        let faces_alike = || {
+            let direction = other.normal.direction();
+            self.normal.dot(direction) > SAME_FACING * direction.length()
+        };
         (other.normal == self.sample.normal || faces_alike()) && self.reaches(other)
     }
 

@@ -234,8 +234,11 @@ impl Marks {
 
     /// Notes that a pixel is of `class`, one of those below; a later one in this order wins.
     pub fn set(&self, pixel: usize, class: PixelClass) {
-        let rank = Self::RANKS.iter().position(|&c| c == class).unwrap_or(0) as u8;
-        self.0[pixel].fetch_max(rank + 1, Relaxed);
+        let rank = Self::RANKS.iter().position(|&c| c == class).unwrap_or(0) as u8 + 1;
+        // Reading is much cheaper, and nearly all that is found is known.
+        if self.0[pixel].load(Relaxed) < rank {
+            self.0[pixel].fetch_max(rank, Relaxed);
+        }
     }
 
     /// The strongest finding about a pixel.

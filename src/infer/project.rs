@@ -75,7 +75,7 @@ pub fn project(old: &BuzzBuffer, new_view: &Projector, landings: &Landings, mark
                 continue;
             }
             let background = old.surface[i].is_background();
-            let Some(p) = new_view.project(old.position[i], old.normal[i].get(), background) else {
+            let Some(p) = new_view.project(old.position[i], old.normal[i].direction(), background) else {
                 continue;
             };
             nearest = nearest.min(p.z);

@@ -24,7 +24,7 @@ pub(super) fn carry(
     if sample.surface.is_background() {
         return;
     }
-    let Some(landed) = view.project(old.position[i], old.normal[i].get(), false) else {
+    let Some(landed) = view.project(old.position[i], old.normal[i].direction(), false) else {
         return rays.confirm(ask);
     };
     let (width, height) = (old.width(), old.height());

@@ -63,7 +63,7 @@ pub fn other_eye(left: &BuzzBuffer, parallax: &Parallax, landings: &Landings, ma
             let column = parallax.column(left, i, z);
             let at = Projected { x: column, y: y as f32 + 0.5, z };
             if let Some(pixel) = parallax.right.pixel(at.x, at.y)
-                && (background || parallax.right.faces(left.position[i], left.normal[i].get()))
+                && (background || parallax.right.faces(left.position[i], left.normal[i].direction()))
             {
                 landings.land(pixel, at, i, marks);
             }

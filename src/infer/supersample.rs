@@ -94,7 +94,7 @@ fn land(old: Samples<'_>, view: &Projector, landings: &mut Landings) -> u64 {
         if sample.object == UNKNOWN {
             return 0;
         }
-        let place = view.project(sample.position, sample.normal.get(), sample.surface.is_background());
+        let place = view.project(sample.position, sample.normal.direction(), sample.surface.is_background());
         let Some(p) = place.filter(|p| view.pixel(p.x, p.y).is_some()) else { return 0 };
         let [x, y] = [p.x, p.y].map(|raster| (lattice.from_raster(raster) + 0.5) as usize);
         landings.land_beside(y * columns + x, p.z, number, false);
@@ -321,7 +321,7 @@ impl<R: CastCentres> Carried<'_, R> {
     /// True if a sample lies at the very place.
     fn is_at(&self, number: usize, at: Position) -> bool {
         let (sample, _) = self.old.get(number);
-        let place = self.view.project(sample.position, sample.normal.get(), sample.surface.is_background());
+        let place = self.view.project(sample.position, sample.normal.direction(), sample.surface.is_background());
         let near = AT_CENTRE * self.old.lattice.steps() as f32;
         let is_near = |raster: f32, at: u32| (self.old.lattice.from_raster(raster) - at as f32).abs() < near;
         place.is_some_and(|p| is_near(p.x, at[0]) && is_near(p.y, at[1]))

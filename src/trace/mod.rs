@@ -127,7 +127,7 @@ impl<'a> Tracer<'a> {
     /// Counts `shadow` and `ambient`.
     pub fn recast(&self, sample: &SurfaceSample, ask: &[u32], lit: &mut [u32], rays: &mut RayCounts) {
         if !sample.surface.is_background() {
-            let side = Side::Towards(sample.normal.get());
+            let side = Side::Towards(sample.normal.direction());
             let point = SurfacePoint::new(self.scene, self.accel, sample.surface, side);
             self.look_for_lights(&point, |field, lit| field.inquiry(ask, lit), lit, rays);
         }
@@ -341,7 +341,7 @@ impl<'a> Tracer<'a> {
     }
 
     fn interaction(&self, sample: &SurfaceSample, toward: Vec3, beam: Beam) -> SurfaceInteraction<'a> {
-        let side = Side::Towards(sample.normal.get());
+        let side = Side::Towards(sample.normal.direction());
         SurfaceInteraction::new(self.scene, self.accel, sample.surface, side, toward, beam)
     }
 
