@@ -9,10 +9,10 @@ use rayon::prelude::*;
 const CHUNK: usize = 8192;
 
 impl Accel {
-    /// The corners, relative to the origin, of every triangle whose plane the eye crosses between two views to look at a
-    /// visible side, or from which it moves away by as much as it was before it at first: the old view showed it as a
-    /// line, or through its culled back not at all.
-    pub fn turned(&self, scene: &Scene, old: &View, new: &View) -> Vec<[Vec3; 3]> {
+    /// Visits, in any order, the corners, relative to the origin, of every triangle whose plane the eye crosses between two
+    /// views to look at a visible side, or from which it moves away by as much as it was before it at first: the old view
+    /// showed it as a line, or through its culled back not at all.
+    pub fn turned(&self, scene: &Scene, (old, new): (&View, &View), visit: &(dyn Fn([Vec3; 3]) + Sync)) {
         let eyes = [old, new].map(|view| self.eye_of(view));
         let of_instance = |index: usize| {
             let instance = &scene.instances[index];
@@ -29,19 +29,20 @@ impl Accel {
                 (at, w)
             });
             let positions = self.positions(index, mesh);
-            let opens = move |triangle: &[u32; 3]| {
+            let look = |triangle: &[u32; 3]| {
                 let [a, b, c] = triangle.map(|i| Vec3A::from(positions[i as usize]));
                 let normal = (b - a).cross(c - a) * placement.winding;
                 let before = |(at, w): (Vec3A, f32)| normal.dot(at - a * w);
                 let (was, is) = (before(old), before(new));
                 let side = if culled { 1.0 } else { is.signum() };
-                (is * side > 0.0 && was * side <= 0.5 * is * side)
-                    .then(|| [a, b, c].map(|p| placement.render_from_object.transform_point3a(p).into()))
+                if is * side > 0.0 && was * side <= 0.5 * is * side {
+                    visit([a, b, c].map(|p| placement.render_from_object.transform_point3a(p).into()));
+                }
             };
             let present: &[[u32; 3]] = if placement.present { &mesh.triangles } else { &[] };
-            present.par_chunks(CHUNK).flat_map_iter(move |chunk| chunk.iter().filter_map(opens))
+            present.par_iter().with_min_len(CHUNK).for_each(look);
         };
-        (0..scene.instances.len()).into_par_iter().flat_map(of_instance).collect()
+        (0..scene.instances.len()).into_par_iter().for_each(of_instance);
     }
 
     /// The eye of a view, or the direction towards it for parallel rays (weight 0).

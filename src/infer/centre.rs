@@ -171,7 +171,8 @@ impl Centring {
                 let nearby = || around.known().next().filter(|_| around.known().count() >= ENOUGH_TO_FILL);
                 let centred = own.or_else(nearby).and_then(|i| {
                     let triangles = around.one_surface(i)?;
-                    let sample = rays.nearest_of(x, y, triangles.iter().map(|k| old.sample(k)), &mut memory)?;
+                    let sample =
+                        rays.nearest_of(x, y, triangles.iter().map(|k| old.sample(k)), &mut memory)?;
                     Some((i, sample))
                 });
                 if let Some((i, sample)) = centred {

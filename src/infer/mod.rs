@@ -193,7 +193,7 @@ impl Inference {
         };
 
         // Clear what a surface that opens to the eye stands before (not in the paper, whose objects are solid).
-        turned(&rays.turned(old_view), &to, landings, marks);
+        rays.turned(old_view, &|triangle| turned(triangle, &to, landings, marks));
 
         // Clear the contested area, where new objects may come in: k is the nearest that is known.
         if let Some(k) = nearest {

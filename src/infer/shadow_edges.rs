@@ -15,8 +15,9 @@ use std::ops::Range;
 /// What following holds between frames, so that nothing is allocated for each.
 #[derive(Debug, Default)]
 pub(super) struct ShadowEdges {
-    /// For each row: pixels that differ from one around them and have not asked everything.
-    rows: Vec<Vec<u32>>,
+    /// Row by row, pixels that differ from one around them and have not asked everything, and how many each row has.
+    rows: Vec<u32>,
+    found: Vec<usize>,
     /// Pixels to look at, in order; those to look at next.
     pixels: Vec<u32>,
     next: Vec<u32>,
@@ -40,9 +41,11 @@ impl ShadowEdges {
         if words == 0 {
             return counts;
         }
-        self.rows.resize_with(buffer.height(), Vec::new);
-        self.rows.par_iter_mut().with_min_len(8).enumerate().for_each(|(y, row)| {
-            row.clear();
+        self.make_room(width * buffer.height(), words);
+        self.found.resize(buffer.height(), 0);
+        let rows = self.rows.par_chunks_mut(width).zip(&mut self.found);
+        rows.with_min_len(8).enumerate().for_each(|(y, (row, found))| {
+            *found = 0;
             let wonders = |pixel: &usize| {
                 let asked = &asked[pixel * words..][..words];
                 asked.iter().any(|&bits| bits != u32::MAX) && differs_around(buffer, *pixel)
@@ -50,17 +53,33 @@ impl ShadowEdges {
             for first in (0..width).step_by(STRETCH) {
                 let stretch = y * width + first..y * width + (first + STRETCH).min(width);
                 if !is_even(buffer, &stretch) {
-                    row.extend(stretch.filter(wonders).map(|pixel| pixel as u32));
+                    for pixel in stretch.filter(wonders) {
+                        row[*found] = pixel as u32;
+                        *found += 1;
+                    }
                 }
             }
         });
-        self.pixels.clear();
-        self.rows.iter().for_each(|row| self.pixels.extend(row));
+        let rows = self.rows.chunks(width).zip(&self.found);
+        rows.for_each(|(row, &found)| self.pixels.extend(&row[..found]));
         while !self.pixels.is_empty() && !rays.is_cancelled() {
             counts += self.ask(buffer, view, asked, rays);
             self.apply(buffer, asked);
         }
         counts
+    }
+
+    /// Takes the memory for as many pixels as there can be; what is not written to costs nothing.
+    fn make_room(&mut self, pixels: usize, words: usize) {
+        self.rows.resize(pixels, 0);
+        for list in [&mut self.pixels, &mut self.next] {
+            list.clear();
+            list.reserve(pixels);
+        }
+        for bits in [&mut self.ask, &mut self.lit] {
+            bits.clear();
+            bits.reserve(pixels * words);
+        }
     }
 
     /// Asks the lights about which any neighbour disagrees.
@@ -120,8 +139,8 @@ const STRETCH: usize = 16;
 /// True if the pixels of a stretch within a row are inside the image and have the same shadow bits as all around them.
 fn is_even(buffer: &BuzzBuffer, stretch: &Range<usize>) -> bool {
     let (width, height, words) = (buffer.width(), buffer.height(), buffer.lit_words());
-    let y = stretch.start / width;
-    let is_inside = y > 0 && y + 1 < height && stretch.start % width > 0 && stretch.end % width > 0;
+    let (x, y) = (stretch.start % width, stretch.start / width);
+    let is_inside = x > 0 && x + stretch.len() < width && y > 0 && y + 1 < height;
     is_inside && {
         let row = |first: usize| &buffer.lit[(first - 1) * words..(first + stretch.len() + 1) * words];
         let own = row(stretch.start);

@@ -321,7 +321,8 @@ impl<R: CastCentres> Carried<'_, R> {
     /// True if a sample lies at the very place.
     fn is_at(&self, number: usize, at: Position) -> bool {
         let (sample, _) = self.old.get(number);
-        let place = self.view.project(sample.position, sample.normal.direction(), sample.surface.is_background());
+        let place =
+            self.view.project(sample.position, sample.normal.direction(), sample.surface.is_background());
         let near = AT_CENTRE * self.old.lattice.steps() as f32;
         let is_near = |raster: f32, at: u32| (self.old.lattice.from_raster(raster) - at as f32).abs() < near;
         place.is_some_and(|p| is_near(p.x, at[0]) && is_near(p.y, at[1]))
@@ -334,7 +335,8 @@ impl<R: CastCentres> Carried<'_, R> {
         let front = around.front()?;
         let is_one = around.samples().all(|sample| is_one_surface(&front, &sample, view));
         let candidates = around.distinct().filter(|s| is_one || !s.surface.is_background());
-        let met = self.rays.nearest_of(at[0] as usize, at[1] as usize, candidates, &mut R::Memory::default())?;
+        let met =
+            self.rays.nearest_of(at[0] as usize, at[1] as usize, candidates, &mut R::Memory::default())?;
         (is_one || is_one_surface(&met, &front, view)).then_some(met)
     }
 

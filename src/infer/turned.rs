@@ -10,42 +10,46 @@ use super::project::Landings;
 use crate::frame::PixelClass;
 use glam::{Vec3, Vec4};
 
-/// Marks the pixels on which the triangles (relative to the view's origin) stand before what landed there.
-pub fn turned(triangles: &[[Vec3; 3]], view: &Projector, landings: &Landings, marks: &Marks) {
-    for triangle in triangles {
-        let corners =
-            before_the_eye(triangle.map(|p| *view.raster_from_world() * p.extend(1.0)), view.near());
-        let Some(nearest) = corners.iter().map(|c| c.z).reduce(f32::min) else { continue };
-        let outline: Vec<(f32, f32)> = corners.iter().map(|c| (c.x / c.w, c.y / c.w)).collect();
-        for_each_centre(&outline, view.size(), |x, y| {
-            if let Some(pixel) = view.pixel(x, y)
-                && landings.z(pixel).is_none_or(|z| z > nearest)
-            {
-                marks.set(pixel, PixelClass::Bad);
-            }
-        });
-    }
+/// Marks the pixels on which a triangle (relative to the view's origin) stands before what landed there.
+pub fn turned(triangle: [Vec3; 3], view: &Projector, landings: &Landings, marks: &Marks) {
+    let triangle = triangle.map(|p| *view.raster_from_world() * p.extend(1.0));
+    let (corners, count) = before_the_eye(triangle, view.near());
+    let corners = &corners[..count];
+    let Some(nearest) = corners.iter().map(|c| c.z).reduce(f32::min) else { return };
+    let mut outline = [(0.0, 0.0); 4];
+    outline.iter_mut().zip(corners).for_each(|(place, c)| *place = (c.x / c.w, c.y / c.w));
+    for_each_centre(&outline[..count], view.size(), |x, y| {
+        if let Some(pixel) = view.pixel(x, y)
+            && landings.z(pixel).is_none_or(|z| z > nearest)
+        {
+            marks.set(pixel, PixelClass::Bad);
+        }
+    });
 }
 
 /// What is nearer to the plane of the eye than this share of the farthest corner's depth is cut off with what is before the
 /// near plane: it lies far outside the image, where single precision ends.
 const NEAREST: f32 = 1e-3;
 
-/// The part of a triangle beyond the near plane, in homogeneous raster coordinates: up to four corners.
-fn before_the_eye(triangle: [Vec4; 3], near: f32) -> Vec<Vec4> {
+/// The part of a triangle beyond the near plane, in homogeneous raster coordinates: so many corners.
+fn before_the_eye(triangle: [Vec4; 3], near: f32) -> ([Vec4; 4], usize) {
     let farthest = triangle.iter().map(|c| c.z).fold(0.0, f32::max);
     let near = near.max(NEAREST * farthest);
-    let mut kept = Vec::with_capacity(4);
+    let (mut kept, mut count) = ([Vec4::ZERO; 4], 0);
+    let mut keep = |corner| {
+        kept[count] = corner;
+        count += 1;
+    };
     for (i, &a) in triangle.iter().enumerate() {
         let b = triangle[(i + 1) % 3];
         if a.z > near {
-            kept.push(a);
+            keep(a);
         }
         if (a.z > near) != (b.z > near) {
-            kept.push(a.lerp(b, (near - a.z) / (b.z - a.z)));
+            keep(a.lerp(b, (near - a.z) / (b.z - a.z)));
         }
     }
-    kept
+    (kept, count)
 }
 
 /// Visits the centre of every pixel of the window that a convex outline covers.
@@ -112,12 +116,13 @@ mod tests {
     #[test]
     fn what_is_behind_the_eye_is_cut_off() {
         let corner = |z: f32| Vec4::new(0.0, 0.0, z, z);
-        assert_eq!(before_the_eye([corner(-1.0), corner(-2.0), corner(0.1)], 0.5).len(), 0);
-        assert_eq!(before_the_eye([corner(1.0), corner(2.0), corner(3.0)], 0.5).len(), 3);
+        assert_eq!(before_the_eye([corner(-1.0), corner(-2.0), corner(0.1)], 0.5).1, 0);
+        assert_eq!(before_the_eye([corner(1.0), corner(2.0), corner(3.0)], 0.5).1, 3);
         let cut = before_the_eye([corner(-1.0), corner(2.0), corner(3.0)], 0.5);
-        assert_eq!(cut.len(), 4);
-        assert!(cut.iter().all(|c| c.z >= 0.5 - 1e-6));
+        assert_eq!(cut.1, 4);
+        assert!(cut.0.iter().all(|c| c.z >= 0.5 - 1e-6));
         // Without a near plane too.
-        assert!(before_the_eye([corner(-1.0), corner(2.0), corner(3.0)], 0.0).iter().all(|c| c.z > 1e-3));
+        let cut = before_the_eye([corner(-1.0), corner(2.0), corner(3.0)], 0.0);
+        assert!(cut.0[..cut.1].iter().all(|c| c.z > 1e-3));
     }
 }

@@ -75,6 +75,15 @@ pub struct PosedLight {
     pub range: Option<f32>,
 }
 
+impl PosedLight {
+    /// A light at rest at the origin, dark.
+    pub(super) fn new(light: &Light) -> Self {
+        let Light { kind, size, range, .. } = *light;
+        let (position, direction, right) = (DVec3::ZERO, DVec3::NEG_Z, DVec3::X);
+        Self { kind, position, direction, right, intensity: Vec3::ZERO, size, range }
+    }
+}
+
 impl Scene {
     /// True if light number `light` has a size, now or at some time: its shadows are soft.
     pub fn light_has_size(&self, light: usize) -> bool {

@@ -41,7 +41,7 @@ pub struct Node {
 }
 
 /// What [`Scene::pose`] finds: the scene at one time.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, Default, PartialEq)]
 pub struct Pose {
     /// For each node.
     pub world_from_node: Vec<DAffine3>,
@@ -53,21 +53,43 @@ pub struct Pose {
     pub lights: Vec<PosedLight>,
     /// For each camera.
     pub lenses: Vec<Lens>,
+    scratch: Scratch,
+}
+
+/// What is needed on the way to a pose, kept so that the next one allocates nothing.
+#[derive(Debug, Clone, Default, PartialEq)]
+struct Scratch {
+    /// For each node.
+    transforms: Vec<LocalTransform>,
+    /// Colour and intensity of each light.
+    emitted: Vec<(Vec3, f32)>,
+    /// Of one channel.
+    value: Vec<f64>,
 }
 
 impl Scene {
     /// The scene at `time` seconds; keys within a thousandth of a frame are met exactly.
     pub fn pose(&self, time: f64) -> Pose {
+        let mut pose = Pose::default();
+        self.pose_into(time, &mut pose);
+        pose
+    }
+
+    /// [`Scene::pose`] in the memory of another pose of this scene.
+    pub fn pose_into(&self, time: f64, pose: &mut Pose) {
         let snap = self.timing.snap_seconds();
-        let mut transforms: Vec<LocalTransform> = self.nodes.iter().map(|n| n.transform).collect();
-        let mut weights: Vec<Vec<f32>> = self.nodes.iter().map(|n| n.weights.clone()).collect();
-        let mut visible: Vec<bool> = self.nodes.iter().map(|n| !n.hidden).collect();
-        let mut lenses: Vec<Lens> = self.cameras.iter().map(|c| c.lens).collect();
-        let mut lights = self.lights.clone();
-        let mut value = Vec::new();
+        let Pose { world_from_node, visible, weights, lights, lenses, scratch } = pose;
+        let Scratch { transforms, emitted, value } = scratch;
+        refill(transforms, self.nodes.iter().map(|n| n.transform));
+        refill(visible, self.nodes.iter().map(|n| !n.hidden));
+        refill(lenses, self.cameras.iter().map(|c| c.lens));
+        refill(lights, self.lights.iter().map(PosedLight::new));
+        refill(emitted, self.lights.iter().map(|l| (l.color, l.intensity)));
+        weights.resize_with(self.nodes.len(), Vec::new);
+        weights.iter_mut().zip(&self.nodes).for_each(|(weights, node)| weights.clone_from(&node.weights));
         for channel in &self.channels {
             let curve: &Curve = &channel.curve;
-            curve.sample_into(time, snap, &mut value);
+            curve.sample_into(time, snap, value);
             let v = value.as_slice();
             match channel.target {
                 Target::Translation(n) => {
@@ -86,7 +108,7 @@ impl Scene {
                         *scale = DVec3::from_slice(v);
                     }
                 }
-                Target::Weights(n) => weights[n] = v.iter().map(|&w| w as f32).collect(),
+                Target::Weights(n) => refill(&mut weights[n], v.iter().map(|&w| w as f32)),
                 Target::Visible(n) => visible[n] = v[0] != 0.0,
                 Target::CameraYfov(c) => lenses[c].set_yfov(v[0]),
                 Target::CameraXmag(c) => lenses[c].set_xmag(v[0]),
@@ -94,8 +116,8 @@ impl Scene {
                 Target::CameraNear(c) => lenses[c].near = v[0],
                 Target::CameraFar(c) => lenses[c].far = v[0],
                 Target::CameraShift(c) => lenses[c].shift = DVec2::from_slice(v),
-                Target::LightColor(l) => lights[l].color = Vec3::new(v[0] as f32, v[1] as f32, v[2] as f32),
-                Target::LightIntensity(l) => lights[l].intensity = v[0] as f32,
+                Target::LightColor(l) => emitted[l].0 = Vec3::new(v[0] as f32, v[1] as f32, v[2] as f32),
+                Target::LightIntensity(l) => emitted[l].1 = v[0] as f32,
                 Target::LightRange(l) => lights[l].range = Some(v[0] as f32),
                 Target::LightInnerCone(l) => {
                     if let LightKind::Spot { inner_cone, .. } = &mut lights[l].kind {
@@ -115,7 +137,7 @@ impl Scene {
                 }
             }
         }
-        let mut world_from_node: Vec<DAffine3> = Vec::with_capacity(self.nodes.len());
+        world_from_node.clear();
         for (i, node) in self.nodes.iter().enumerate() {
             let local = match transforms[i] {
                 LocalTransform::Trs { translation, rotation, scale } => {
@@ -126,23 +148,16 @@ impl Scene {
             world_from_node.push(node.parent.map_or(local, |p| world_from_node[p] * local));
             visible[i] &= node.parent.is_none_or(|p| visible[p]);
         }
-        let lights = lights.iter().map(|light| {
+        for ((posed, light), &(color, intensity)) in lights.iter_mut().zip(&self.lights).zip(&*emitted) {
             let world_from_light = world_from_node[light.node];
-            let lit = if visible[light.node] { light.intensity } else { 0.0 };
-            let direction = world_from_light.transform_vector3(DVec3::NEG_Z).normalize_or(DVec3::NEG_Z);
+            let lit = if visible[light.node] { intensity } else { 0.0 };
             let right = world_from_light.matrix3.x_axis;
-            PosedLight {
-                kind: light.kind,
-                position: world_from_light.translation,
-                direction,
-                right: right.reject_from(direction).normalize_or(direction.any_orthonormal_vector()),
-                intensity: light.color * lit,
-                size: light.size,
-                range: light.range,
-            }
-        });
-        let lights = lights.collect();
-        Pose { world_from_node, visible, weights, lights, lenses }
+            posed.position = world_from_light.translation;
+            posed.direction = world_from_light.transform_vector3(DVec3::NEG_Z).normalize_or(DVec3::NEG_Z);
+            posed.right =
+                right.reject_from(posed.direction).normalize_or(posed.direction.any_orthonormal_vector());
+            posed.intensity = color * lit;
+        }
     }
 
     /// The camera that frame `frame` is seen through: `chosen` if given, else the scene's cuts, else the first
@@ -190,4 +205,10 @@ impl Scene {
             pixel_aspect: self.timing.pixel_aspect,
         }
     }
+}
+
+/// Replaces what a vector holds, in the memory that it has.
+fn refill<T>(vector: &mut Vec<T>, values: impl Iterator<Item = T>) {
+    vector.clear();
+    vector.extend(values);
 }

@@ -40,8 +40,8 @@ impl Caster<'_> {
 }
 
 impl CastRays for Caster<'_> {
-    fn turned(&self, old: &View) -> Vec<[Vec3; 3]> {
-        self.tracer.turned(old, self.view)
+    fn turned(&self, old: &View, visit: &(dyn Fn([Vec3; 3]) + Sync)) {
+        self.tracer.turned(old, self.view, visit);
     }
 
     fn is_cancelled(&self) -> bool {

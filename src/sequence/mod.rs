@@ -5,8 +5,10 @@
 mod antialias;
 mod caster;
 mod motion;
+mod outward;
 mod path;
 mod resolve;
+mod shot;
 mod stereo;
 
 pub use crate::frame::Quality;
@@ -19,13 +21,15 @@ use crate::frame::{
 };
 use crate::infer::{BuzzBuffer, Inference, Move, Projector, SubPixels, Trust};
 use crate::plan::{Plan, Segment};
-use crate::scene::{Pose, Requirements, Scene, Stereo, View};
+use crate::scene::{Requirements, Scene, Stereo};
 use crate::trace::{TraceOptions, Tracer, lit_words};
 use antialias::Antialias;
 use caster::{Caster, mix};
 use glam::DVec3;
 use motion::SceneMotion;
+use outward::Stage;
 use resolve::{MatteNames, Neighbour, Resolver, count_hidden, empty_frame};
+use shot::Shot;
 use std::collections::BTreeSet;
 use std::time::Instant;
 
@@ -191,21 +195,28 @@ fn render_buffers(settings: &Settings, infers: bool) -> usize {
 /// What inference needs between frames; swapped, never made anew.
 #[derive(Default)]
 struct Buffers {
+    carried: Carried,
+    antialias: Antialias,
+}
+
+/// Samples, and what they are inferred with.
+#[derive(Default)]
+struct Carried {
     key: BuzzBuffer,
     old: BuzzBuffer,
     new: BuzzBuffer,
     /// The right eye's, in stereo.
     right: BuzzBuffer,
     inference: Inference,
-    antialias: Antialias,
 }
 
 impl Buffers {
     /// Makes room for the buffers that [`render_buffers`] counts.
     fn fit(&mut self, settings: &Settings, infers: bool, lit_words: usize) {
         let (width, height) = (settings.window.width as usize, settings.window.height as usize);
-        let right = settings.stereo.map(|_| &mut self.right);
-        let carried = [&mut self.key, &mut self.old, &mut self.new];
+        let Carried { key, old, new, right, .. } = &mut self.carried;
+        let right = settings.stereo.map(|_| right);
+        let carried = [key, old, new];
         for buffer in right.into_iter().chain(carried).take(render_buffers(settings, infers)) {
             if (buffer.width(), buffer.height(), buffer.lit_words()) != (width, height, lit_words) {
                 *buffer = BuzzBuffer::new(width, height, lit_words).with_levels(settings.aa);
@@ -226,75 +237,31 @@ fn render_segment(
     sink: &mut dyn FrameSink,
     observer: &mut dyn Observer,
 ) -> Result<()> {
-    let key_shot = shot(scene, settings, segment.key);
+    let key_shot = Shot::new(scene, settings, segment.key);
     let origin = key_shot.view.eye;
     let infers = segment.first < segment.last;
     buffers.fit(settings, infers, lit_words(scene, settings.trace_options()));
     let names = settings.aovs.contains(Aov::Crypto).then(|| MatteNames::of(scene));
-    let Buffers { key, old, new, right, inference, antialias } = buffers;
+    let Buffers { carried, antialias } = buffers;
     let mut emitter =
         Emitter { scene, settings, segment, origin, cuts, wanted, names, antialias, sink, observer };
 
     accel.place(scene, &key_shot.pose, origin);
     let tracer = Tracer::new(scene, accel, &key_shot.pose, settings.trace_options());
-    let stats = emitter.trace(&tracer, &key_shot, key, inference);
-    emitter.emit((accel, &tracer), &key_shot, key, stats)?;
-    emitter.emit_right((accel, &tracer), (key, &key_shot), right, inference)?;
-
-    // Outward, as far as a wanted frame lies.
-    let before = wanted.first().copied().unwrap_or(segment.key)..segment.key;
-    let after = segment.key + 1..=wanted.last().copied().unwrap_or(segment.key);
-    let needs = Requirements::of(scene);
-    let mut placed = key_shot.pose;
-    for frames in [before.rev().collect::<Vec<_>>(), after.collect()] {
-        let mut from = shot(scene, settings, segment.key);
-        for (i, &number) in frames.iter().enumerate() {
-            let to = shot(scene, settings, number);
-            let source = if i == 0 { &*key } else { &*old };
-            if needs.moving_objects && !scene.surfaces_alike(&placed, &to.pose) {
-                accel.place(scene, &to.pose, origin);
-                placed.clone_from(&to.pose);
-            }
-            let tracer = Tracer::new(scene, accel, &to.pose, settings.trace_options());
-            let poses = (&from.pose, &to.pose);
-            let motion = needs
-                .motion()
-                .then(|| SceneMotion::between(scene, accel, &tracer, poses, &to.view))
-                .flatten();
-            let caster = emitter.caster(&tracer, &to, motion.as_ref());
-            let stats = emitter.infer(Move::Camera, (source, &from), (new, &to), &caster, inference);
-            emitter.emit((accel, &tracer), &to, new, stats)?;
-            emitter.emit_right((accel, &tracer), (new, &to), right, inference)?;
-            std::mem::swap(old, new);
-            from = to;
-        }
-    }
-    Ok(())
-}
-
-/// The camera at a frame, or an eye about it: the rendered window as a view of its own, and the whole image.
-struct Shot {
-    frame: i64,
-    camera: usize,
-    eye: Option<StereoEye>,
-    view: View,
-    full_view: View,
-    pose: Pose,
-}
-
-/// What is carried from frame to frame: in stereo, the left eye.
-fn shot(scene: &Scene, settings: &Settings, frame: i64) -> Shot {
-    let eye = settings.stereo.map(|_| StereoEye::Left);
-    shot_of(eye, scene, settings, frame)
-}
-
-fn shot_of(eye: Option<StereoEye>, scene: &Scene, settings: &Settings, frame: i64) -> Shot {
-    let pose = scene.pose(scene.timing.time_of(frame));
-    let camera = scene.camera_at(frame, settings.camera);
-    let middle = scene.view(&pose, camera, settings.width, settings.height);
-    let of_eye = |stereo, eye| middle.of_eye(stereo, eye);
-    let full_view = settings.stereo.zip(eye).map_or(middle, |(stereo, eye)| of_eye(stereo, eye));
-    Shot { frame, camera, eye, view: full_view.cropped(settings.window), full_view, pose }
+    let stats = emitter.trace(&tracer, &key_shot, &mut carried.key, &mut carried.inference);
+    emitter.emit((accel, &tracer), &key_shot, &carried.key, stats)?;
+    emitter.emit_right(
+        (accel, &tracer),
+        (&carried.key, &key_shot),
+        &mut carried.right,
+        &mut carried.inference,
+    )?;
+    let stage = if Requirements::of(scene).motion() {
+        Stage::Moving { accel, placed: key_shot.pose.clone() }
+    } else {
+        Stage::Still { accel, tracer: &tracer }
+    };
+    emitter.infer_outward(stage, key_shot, carried)
 }
 
 /// Turns samples into frames and hands them over.
@@ -446,7 +413,7 @@ impl Emitter<'_> {
         let timing = &self.scene.timing;
         let wanted = self.settings.aovs.contains(Aov::Motion) && !is_cut;
         let inside = (timing.first..=timing.last).contains(&number);
-        let other = (wanted && inside).then(|| shot_of(shot.eye, self.scene, self.settings, number));
+        let other = (wanted && inside).then(|| Shot::of_eye(shot.eye, self.scene, self.settings, number));
         other.filter(|o| o.camera == shot.camera).map(|o| {
             let moved = !self.scene.surfaces_alike(&shot.pose, &o.pose);
             Neighbour { view: o.view, surfaces: moved.then(|| accel.displaced(self.scene, &o.pose)) }
@@ -466,7 +433,7 @@ mod tests {
             for infers in [false, true] {
                 let mut buffers = Buffers::default();
                 buffers.fit(&settings, infers, 1);
-                let Buffers { key, old, new, right, .. } = &buffers;
+                let Carried { key, old, new, right, .. } = &buffers.carried;
                 let made = [key, old, new, right].into_iter().filter(|b| b.width() > 0).count();
                 assert_eq!(made, render_buffers(&settings, infers));
                 assert_eq!((key.width(), right.width() > 0), (3, stereo.is_some()));

@@ -8,6 +8,7 @@ use crate::infer::BuzzBuffer;
 use crate::scene::{Scene, View};
 use crate::trace::{Eye, Tracer};
 use glam::{DVec3, DVec4, Vec3, Vec4};
+use rayon::iter::Either;
 use rayon::prelude::*;
 use std::sync::Arc;
 
@@ -167,8 +168,7 @@ impl Resolver<'_> {
             }
             counts
         };
-        let rows: Vec<Row<'_>> = rows(frame, width);
-        rows.into_par_iter().enumerate().map(|(y, row)| fill_row(y, row)).sum()
+        rows(frame, width).enumerate().map(|(y, row)| fill_row(y, row)).sum()
     }
 
     /// Shades a sample of a pixel or sub-pixel as wide as `eye` has them, unless the user asked to stop.
@@ -242,17 +242,30 @@ struct Row<'a> {
     emission: &'a mut [[f32; 3]],
 }
 
-fn rows(frame: &mut Frame, width: usize) -> Vec<Row<'_>> {
-    let mut diffuse = frame.diffuse.chunks_mut(width);
-    let mut specular = frame.specular.chunks_mut(width);
-    let mut emission = frame.emission.chunks_mut(width);
-    let row = |color| Row {
+fn rows(frame: &mut Frame, width: usize) -> impl IndexedParallelIterator<Item = Row<'_>> {
+    let height = frame.color.len() / width;
+    let [diffuse, specular, emission] = [&mut frame.diffuse, &mut frame.specular, &mut frame.emission]
+        .map(|layer| rows_or_none(layer, width, height));
+    let layers = (frame.color.par_chunks_mut(width), diffuse, specular, emission);
+    layers.into_par_iter().map(|(color, diffuse, specular, emission)| Row {
         color,
-        diffuse: diffuse.next().unwrap_or_default(),
-        specular: specular.next().unwrap_or_default(),
-        emission: emission.next().unwrap_or_default(),
-    };
-    frame.color.chunks_mut(width).map(row).collect()
+        diffuse,
+        specular,
+        emission,
+    })
+}
+
+/// The rows of a layer; as many without a pixel if it is not asked for.
+fn rows_or_none<T: Send + Sync>(
+    layer: &mut [T],
+    width: usize,
+    height: usize,
+) -> impl IndexedParallelIterator<Item = &mut [T]> {
+    if layer.is_empty() {
+        Either::Left((0..height).into_par_iter().map(|_| Default::default()))
+    } else {
+        Either::Right(layer.par_chunks_mut(width))
+    }
 }
 
 /// Computes a layer of `size` pixels in parallel.

@@ -1,6 +1,7 @@
 //! The right eye of a stereo pair, from the left one of the same frame.
 
-use super::{Emitter, Shot, shot_of};
+use super::Emitter;
+use super::shot::Shot;
 use crate::Result;
 use crate::accel::Accel;
 use crate::frame::{Quality, StereoEye};
@@ -20,7 +21,7 @@ impl Emitter<'_> {
         if self.settings.stereo.is_none() || !self.wanted.contains(&left_shot.frame) {
             return Ok(());
         }
-        let shot = shot_of(Some(StereoEye::Right), self.scene, self.settings, left_shot.frame);
+        let shot = Shot::of_eye(Some(StereoEye::Right), self.scene, self.settings, left_shot.frame);
         let stats = if self.settings.quality == Quality::Full {
             self.trace(tracer, &shot, right, inference)
         } else {

@@ -200,9 +200,9 @@ impl<'a> Tracer<'a> {
         Some(SurfaceSample { position, surface: hit.surface, normal, ..candidate })
     }
 
-    /// The triangles that open to the eye between two views; see [`Accel::turned`].
-    pub fn turned(&self, old: &View, new: &View) -> Vec<[Vec3; 3]> {
-        self.accel.turned(self.scene, old, new)
+    /// Visits the triangles that open to the eye between two views; see [`Accel::turned`].
+    pub fn turned(&self, old: &View, new: &View, visit: &(dyn Fn([Vec3; 3]) + Sync)) {
+        self.accel.turned(self.scene, (old, new), visit);
     }
 
     /// The first thing on the ray through raster position (x, y): a surface's sample and the point it lies on, or the

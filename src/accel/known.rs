@@ -1,0 +1,82 @@
+//! A triangle that rays ask for by name, again and again.
+
+use super::triangle::{ShearedRay, TriangleHit};
+use super::{Accel, interpolate, opacity};
+use crate::frame::SurfaceRef;
+use crate::scene::{Mesh, Scene};
+use glam::{Affine3A, Vec3, Vec3A, Vec4};
+
+/// The triangle that was asked for last, as rays meet it: the next pixel mostly shows the same.
+#[derive(Debug, Clone, Copy)]
+pub struct KnownTriangle {
+    instance: u32,
+    primitive: u32,
+    /// For each axis of render space: the coordinates of its corners.
+    axes: [Vec4; 3],
+    /// Its corners in its object's space.
+    corners: [Vec3A; 3],
+    render_from_object: Affine3A,
+    /// Whether rays meet its front where they meet its back by its winding.
+    mirrored: bool,
+    /// Whether alpha may cut holes into it.
+    has_holes: bool,
+}
+
+impl Default for KnownTriangle {
+    /// None yet.
+    fn default() -> Self {
+        Self {
+            instance: SurfaceRef::NONE,
+            primitive: 0,
+            axes: [Vec4::NAN; 3],
+            corners: [Vec3A::NAN; 3],
+            render_from_object: Affine3A::IDENTITY,
+            mirrored: false,
+            has_holes: false,
+        }
+    }
+}
+
+impl KnownTriangle {
+    /// Becomes the triangle on which `surface` lies, of an instance of `mesh`.
+    pub(super) fn learn(&mut self, accel: &Accel, scene: &Scene, mesh: &Mesh, surface: SurfaceRef) {
+        if self.knows(surface) {
+            return;
+        }
+        let index = surface.instance as usize;
+        let (positions, placement) = (accel.positions(index, mesh), accel.placement(index));
+        let corners = mesh.triangles[surface.primitive as usize].map(|i| Vec3A::from(positions[i as usize]));
+        let [a, b, c] = corners.map(|p| placement.render_from_object.transform_point3a(p));
+        *self = Self {
+            instance: surface.instance,
+            primitive: surface.primitive,
+            axes: [0, 1, 2].map(|axis| Vec4::new(a[axis], b[axis], c[axis], 0.0)),
+            corners,
+            render_from_object: placement.render_from_object,
+            mirrored: placement.winding < 0.0,
+            has_holes: !opacity::is_alpha_uniform(scene, mesh),
+        };
+    }
+
+    /// Where the ray meets it, if it does; holes are not looked for.
+    pub(super) fn meet(&self, ray: &ShearedRay, t_min: f32, t_max: f32) -> Option<TriangleHit> {
+        let hit = ray.meet(&self.axes, t_min, t_max)?;
+        Some(TriangleHit { front: hit.front ^ self.mirrored, ..hit })
+    }
+
+    /// Whether alpha may cut holes into it.
+    pub(super) fn has_holes(&self) -> bool {
+        self.has_holes
+    }
+
+    /// The point that has the barycentrics of `surface`, relative to the origin; none if that is on something else.
+    pub fn point(&self, surface: SurfaceRef) -> Option<Vec3> {
+        let [a, b, c] = self.corners;
+        let point = || self.render_from_object.transform_point3a(interpolate(a, b, c, surface)).into();
+        self.knows(surface).then(point)
+    }
+
+    fn knows(&self, surface: SurfaceRef) -> bool {
+        (self.instance, self.primitive) == (surface.instance, surface.primitive)
+    }
+}
