@@ -2,7 +2,7 @@
 """How much faster an inferred frame is than a traced one, and what bounds it: a table for docs/performance.md.
 
     cargo build --release
-    .venv/bin/python scenes/speed.py OUT [--resolution 1280x720] [--frames 20] [scene ...]
+    .venv/bin/python scenes/speed.py OUT [--resolution 1280x720] [--frames 20] [--segment 12] [scene ...]
 
 `buzz-convert trade` renders the segments that hold the frames by every quality in turn, twice, without writing; the
 faster round counts. `breakfast_eight` is breakfast_dolly with as many point lights more as make eight.
@@ -79,6 +79,7 @@ def main() -> None:
     parser.add_argument("scenes", nargs="*", default=["breakfast_dolly", "breakfast_eight", "sponza_walk_cut"])
     parser.add_argument("--resolution", default="1280x720")
     parser.add_argument("--frames", default="20")
+    parser.add_argument("--segment", default="12")
     parser.add_argument("--binary", type=Path, default=ROOT / "target/release/buzz-convert")
     args = parser.parse_args()
     args.out.mkdir(parents=True, exist_ok=True)
@@ -93,7 +94,20 @@ def main() -> None:
             print(f"skipped: {scene} is not there")
             continue
         out = args.out / name
-        run(args.binary, "trade", scene, out, "-r", args.resolution, "-f", args.frames, "--progress", "none")
+        run(
+            args.binary,
+            "trade",
+            scene,
+            out,
+            "-r",
+            args.resolution,
+            "-f",
+            args.frames,
+            "--segment",
+            args.segment,
+            "--progress",
+            "none",
+        )
         found += rows(name, json.loads((out / "trade.json").read_text()))
     commit = run("git", "-C", str(ROOT), "rev-parse", "--short", "HEAD").strip()
     cores = len(os.sched_getaffinity(0))

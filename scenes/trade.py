@@ -2,7 +2,7 @@
 """Makes docs/trade.md: `buzz-convert trade` on our scenes and those in ../shared/scenes/walk, beside interpolation.
 
     cargo build --release
-    .venv/bin/python scenes/trade.py OUT [--resolution 640x360] [scene ...]
+    .venv/bin/python scenes/trade.py OUT [--resolution 1280x720] [--segment 24 --frames 20] [scene ...]
 
 The pages with pictures stay in OUT/<scene>/trade.html. Interpolation by optical flow (`interpolate.py`) is measured
 on the same frames, as far as it makes them: every fourth frame of the full sequence is given to it.
@@ -66,19 +66,21 @@ def rows(name: str, trade: dict, flow: dict[str, float]) -> list[list[str]]:
         s = measured["summary"]
         error, spread = s["error"], s["inferred_seconds"]
         exact = error["psnr_db"] is None
-        found.append([
-            name,
-            measured["quality"],
-            f"{1e3 * s['seconds']['mean']:.0f}",
-            f"{1e3 * spread['median']:.0f} ({1e3 * spread['p10']:.0f}-{1e3 * spread['p90']:.0f})" if spread else "",
-            f"{full / s['seconds']['mean']:.2f}",
-            f"{s['rays_per_pixel']:.2f}",
-            "exact" if exact else f"{error['psnr_db']:.1f}",
-            "" if exact else f"{s['worst_db']:.1f}",
-            "" if exact else f"{error['flip_mean']:.4f}",
-            "" if exact else f"{100 * error['over_5_percent']:.1f} %",
-            "" if s["hidden"] is None else f"{100 * s['hidden']:.2f} %",
-        ])
+        found.append(
+            [
+                name,
+                measured["quality"],
+                f"{1e3 * s['seconds']['mean']:.0f}",
+                f"{1e3 * spread['median']:.0f} ({1e3 * spread['p10']:.0f}-{1e3 * spread['p90']:.0f})" if spread else "",
+                f"{full / s['seconds']['mean']:.2f}",
+                f"{s['rays_per_pixel']:.2f}",
+                "exact" if exact else f"{error['psnr_db']:.1f}",
+                "" if exact else f"{s['worst_db']:.1f}",
+                "" if exact else f"{error['flip_mean']:.4f}",
+                "" if exact else f"{100 * error['over_5_percent']:.1f} %",
+                "" if s["hidden"] is None else f"{100 * s['hidden']:.2f} %",
+            ]
+        )
     # A frame in four is traced, the others are made from those.
     cost = 1e3 * (full + (interpolate.KEPT - 1) * flow["seconds"]) / interpolate.KEPT
     made = [f"{cost:.0f}", f"{1e3 * flow['seconds']:.0f}", f"{1e3 * full / cost:.2f}", ""]
@@ -108,7 +110,9 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("out", type=Path)
     parser.add_argument("scenes", nargs="*", default=list(SCENES))
-    parser.add_argument("--resolution", default="640x360")
+    parser.add_argument("--resolution", default="1280x720")
+    parser.add_argument("--segment", help="longest segment, as `buzz-convert trade` takes it")
+    parser.add_argument("--frames", help="segments to measure, as `buzz-convert trade` takes them")
     parser.add_argument("--binary", type=Path, default=ROOT / "target/release/buzz-convert")
     args = parser.parse_args()
     measured, chains, spans, noise = [], [], [], []
@@ -117,23 +121,25 @@ def main() -> None:
         if not scene.exists():
             print(f"skipped: {scene} is not there")
             continue
-        print(run(args.binary, "trade", scene, out, "-r", args.resolution), flush=True)
+        chosen = {"--segment": args.segment, "--frames": args.frames}
+        options = [word for name, value in chosen.items() if value for word in (name, value)]
+        print(run(args.binary, "trade", scene, out, "-r", args.resolution, *options), flush=True)
         trade = json.loads((out / "trade.json").read_text())
         flow = baseline(args.binary, scene, out / "full", args.resolution, trade)
         measured += rows(name, trade, flow)
         chains += chain(name, trade)
         spans.append(f"{name} {', '.join(f'{a}-{b}' for a, b in trade['spans'])}")
         noise.append(max(m["summary"]["noise"] for m in trade["qualities"]))
-        write(args.resolution, measured, chains, spans, max(noise))
+        write(" ".join(["--resolution", args.resolution, *options]), measured, chains, spans, max(noise))
 
 
-def write(resolution: str, measured: list[list[str]], chains: list[list[str]], spans: list[str], noise: float) -> None:
+def write(options: str, measured: list[list[str]], chains: list[list[str]], spans: list[str], noise: float) -> None:
     """Writes docs/trade.md as far as it is known: after each scene, so that a run that is stopped leaves something."""
     commit = run("git", "-C", str(ROOT), "rev-parse", "--short", "HEAD").strip()
     machine = f"{len(os.sched_getaffinity(0))} cores of {processor()}"
     scenes = " ".join(dict.fromkeys(row[0] for row in measured))
     parts = [
-        HEAD.format(commit=commit, machine=machine, resolution=resolution, scenes=scenes, noise=100 * noise),
+        HEAD.format(commit=commit, machine=machine, options=options, scenes=scenes, noise=100 * noise),
         table(TITLES, measured),
         MIDDLE,
         table(["scene", "quality", *map(str, DISTANCES)], chains),
@@ -144,7 +150,7 @@ def write(resolution: str, measured: list[list[str]], chains: list[list[str]], s
 
 HEAD = """# What each quality costs
 
-Written by `.venv/bin/python scenes/trade.py OUT --resolution {resolution} {scenes}`: `buzz-convert trade`
+Written by `.venv/bin/python scenes/trade.py OUT {options} {scenes}`: `buzz-convert trade`
 on each scene ([what it does](review.md#trade)), commit {commit}, {machine}. Every frame was rendered
 twice, the qualities in turn; the slower round took up to {noise:.0f} % longer (median over frames, noisiest scene and
 quality).
