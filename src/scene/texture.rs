@@ -50,6 +50,8 @@ pub struct Image {
     pub name: String,
     /// The full size first, then halves down to 1x1.
     levels: Vec<Level>,
+    /// Of a square with as many texels as the full size.
+    side: f32,
     texels: Texels,
 }
 
@@ -80,7 +82,12 @@ impl Image {
         for pair in levels.windows(2) {
             halve(pair[0], pair[1], &mut texels, |block| average_bytes(block, space));
         }
-        Self { name: name.to_owned(), levels, texels: Texels::Bytes(texels, space) }
+        Self {
+            name: name.to_owned(),
+            levels,
+            side: side(width, height),
+            texels: Texels::Bytes(texels, space),
+        }
     }
 
     /// Makes an image from linear floats (HDR), rows from the top. With no texels, or fewer than its size asks for,
@@ -97,7 +104,7 @@ impl Image {
                 (sum / block.len() as f32).to_array()
             });
         }
-        Self { name: name.to_owned(), levels, texels: Texels::Floats(texels) }
+        Self { name: name.to_owned(), levels, side: side(width, height), texels: Texels::Floats(texels) }
     }
 
     /// Width and height in texels.
@@ -130,66 +137,83 @@ impl Image {
     /// Bilinear within a level and linear between two, or the nearest texel of the nearest level. A footprint below
     /// one texel reads the full image.
     pub fn sample(&self, texture: &TextureRef, uv: Vec2, footprint: f32) -> Vec4 {
-        let (width, height) = self.size();
-        let texels = footprint * (width as f32 * height as f32).sqrt();
-        let last = self.levels.len() - 1;
-        if texture.nearest {
-            let level = if texels > 1.0 { (log2(texels) + 0.5) as usize } else { 0 };
-            return self.nearest(texture, self.levels[level.min(last)], uv);
-        }
-        // NaN compares false and reads the full image.
-        if texels > 1.0 {
-            let lod = log2(texels);
-            let fine = (lod as usize).min(last);
-            let coarse = (fine + 1).min(last);
-            let a = self.bilinear(texture, self.levels[fine], uv);
-            if coarse == fine {
-                return a;
-            }
-            let b = self.bilinear(texture, self.levels[coarse], uv);
-            return a + (b - a) * (lod - fine as f32);
-        }
-        self.bilinear(texture, self.levels[0], uv)
-    }
-
-    fn nearest(&self, texture: &TextureRef, level: Level, uv: Vec2) -> Vec4 {
-        let (x, y) = (
-            floor(wrapped(texture.wrap_u, uv.x) * level.width as f32),
-            floor(wrapped(texture.wrap_v, uv.y) * level.height as f32),
-        );
-        let x = neighbour(texture.wrap_u, x, level.width);
-        let y = neighbour(texture.wrap_v, y, level.height);
-        let [texel] = self.texels([level.first + (y * level.width + x) as usize]);
-        texel
-    }
-
-    fn bilinear(&self, texture: &TextureRef, level: Level, uv: Vec2) -> Vec4 {
-        let x = wrapped(texture.wrap_u, uv.x) * level.width as f32 - 0.5;
-        let y = wrapped(texture.wrap_v, uv.y) * level.height as f32 - 0.5;
-        let (x0, y0) = (floor(x), floor(y));
-        let (fx, fy) = (x - x0 as f32, y - y0 as f32);
-        let left = neighbour(texture.wrap_u, x0, level.width) as usize;
-        let right = neighbour(texture.wrap_u, x0 + 1, level.width) as usize;
-        let top = level.first + (neighbour(texture.wrap_v, y0, level.height) * level.width) as usize;
-        let bottom = level.first + (neighbour(texture.wrap_v, y0 + 1, level.height) * level.width) as usize;
-        let [a, b, c, d] = self.texels([top + left, top + right, bottom + left, bottom + right]);
-        let (upper, lower) = (a + (b - a) * fx, c + (d - c) * fx);
-        upper + (lower - upper) * fy
-    }
-
-    /// Linear values of some texels.
-    #[inline]
-    fn texels<const N: usize>(&self, indices: [usize; N]) -> [Vec4; N] {
         match &self.texels {
-            Texels::Bytes(texels, space) => {
-                let table = linear_from_code(*space);
-                indices.map(|i| {
-                    let [r, g, b, a] = texels[i].map(usize::from);
+            Texels::Bytes(texels, ColorSpace::Srgb) => {
+                let table: &[f32; 256] = &LINEAR_FROM_SRGB;
+                self.filter(texels, texture, uv, footprint, |texel| {
+                    let [r, g, b, a] = texel.map(usize::from);
                     Vec4::new(table[r], table[g], table[b], LINEAR_FROM_BYTE[a])
                 })
             }
-            Texels::Floats(texels) => indices.map(|i| Vec3::from(texels[i]).extend(1.0)),
+            Texels::Bytes(texels, ColorSpace::Linear) => {
+                let code = |texel: [u8; 4]| Vec4::from_array(texel.map(f32::from));
+                self.filter(texels, texture, uv, footprint, code) / 255.0
+            }
+            Texels::Floats(texels) => {
+                self.filter(texels, texture, uv, footprint, |texel| Vec3::from(texel).extend(1.0))
+            }
         }
+    }
+
+    /// The mean of `texels` over a footprint, each as `decode` has it.
+    #[inline]
+    fn filter<T: Copy>(
+        &self,
+        texels: &[T],
+        texture: &TextureRef,
+        uv: Vec2,
+        footprint: f32,
+        decode: impl Fn(T) -> Vec4,
+    ) -> Vec4 {
+        let width = footprint * self.side;
+        let last = self.levels.len() - 1;
+        let wraps = [texture.wrap_u, texture.wrap_v];
+        let at = Vec2::new(wrapped(wraps[0], uv.x), wrapped(wraps[1], uv.y));
+        if texture.nearest {
+            let level = if width > 1.0 { (log2(width) + 0.5) as usize } else { 0 };
+            return decode(texels[self.levels[level.min(last)].nearest(wraps, at)]);
+        }
+        // NaN compares false and reads the full image.
+        let lod = if width > 1.0 { log2(width) } else { 0.0 };
+        let fine = (lod as usize).min(last);
+        let a = self.levels[fine].bilinear(texels, wraps, at, &decode);
+        if fine == last || lod == 0.0 {
+            return a;
+        }
+        let b = self.levels[fine + 1].bilinear(texels, wraps, at, &decode);
+        a + (b - a) * (lod - fine as f32)
+    }
+}
+
+impl Level {
+    /// The number of the texel nearest to `at`, which is wrapped already.
+    fn nearest(&self, wraps: [Wrap; 2], at: Vec2) -> usize {
+        let x = neighbour(wraps[0], floor(at.x * self.width as f32), self.width);
+        let y = neighbour(wraps[1], floor(at.y * self.height as f32), self.height);
+        self.first + (y * self.width + x) as usize
+    }
+
+    /// The mean of the four texels around `at`, which is wrapped already, weighed by how near they are.
+    #[inline]
+    fn bilinear<T: Copy>(
+        &self,
+        texels: &[T],
+        wraps: [Wrap; 2],
+        at: Vec2,
+        decode: impl Fn(T) -> Vec4,
+    ) -> Vec4 {
+        let x = at.x * self.width as f32 - 0.5;
+        let y = at.y * self.height as f32 - 0.5;
+        let (x0, y0) = (floor(x), floor(y));
+        let (fx, fy) = (x - x0 as f32, y - y0 as f32);
+        let left = neighbour(wraps[0], x0, self.width) as usize;
+        let right = neighbour(wraps[0], x0 + 1, self.width) as usize;
+        let top = self.first + (neighbour(wraps[1], y0, self.height) * self.width) as usize;
+        let bottom = self.first + (neighbour(wraps[1], y0 + 1, self.height) * self.width) as usize;
+        let (a, b) = (decode(texels[top + left]), decode(texels[top + right]));
+        let (c, d) = (decode(texels[bottom + left]), decode(texels[bottom + right]));
+        let (upper, lower) = (a + (b - a) * fx, c + (d - c) * fx);
+        upper + (lower - upper) * fy
     }
 }
 
@@ -209,14 +233,11 @@ fn wrapped(wrap: Wrap, u: f32) -> f32 {
 /// The texel that stands at `x`, which is at most one texel outside the image.
 #[inline]
 fn neighbour(wrap: Wrap, x: i32, size: u32) -> u32 {
-    let size = size as i32;
-    let x = match wrap {
-        Wrap::Repeat if x < 0 => size - 1,
-        Wrap::Repeat if x >= size => 0,
-        // Mirrored at the border, the texel beyond it is the border's own.
-        _ => x,
-    };
-    x.clamp(0, size - 1) as u32
+    let last = size as i32 - 1;
+    // Mirrored at the border, the texel beyond it is the border's own.
+    let (before, after) = if wrap == Wrap::Repeat { (last, 0) } else { (0, last) };
+    let x = if x < 0 { before } else { x };
+    (if x > last { after } else { x }) as u32
 }
 
 /// `f32::floor` without a call into the C library, which it is on plain x86-64.
@@ -247,6 +268,10 @@ fn whole<T: Copy>(width: u32, height: u32, mut texels: Vec<T>, white: T) -> (u32
     }
     texels.truncate(size);
     (width, height, texels)
+}
+
+fn side(width: u32, height: u32) -> f32 {
+    (width as f32 * height as f32).sqrt()
 }
 
 /// All levels of an image, each half the one before, down to 1x1.

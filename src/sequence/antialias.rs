@@ -8,6 +8,7 @@ use super::resolve::{Pixel, Resolver};
 use crate::accel::KnownTriangle;
 use crate::frame::{Frame, RayCounts, SurfaceSample};
 use crate::infer::{BuzzBuffer, Level, Position, Samples, SubPixels};
+use crate::trace::Shader;
 use glam::Vec4;
 use rayon::prelude::*;
 
@@ -43,11 +44,12 @@ impl Antialias {
         let stored = Samples::of(buffer);
         let count = buffer.object.len();
         self.pixels.resize(count, Pixel::default());
-        let shade_pixel = |(i, pixel): (usize, &mut Pixel)| {
-            resolver.shade_sample(&resolver.eye, &buffer.sample(i), buffer.lit(i), pixel)
+        let shader = || resolver.tracer.shader();
+        let shade_pixel = |shader: &mut Shader<'_, '_>, (i, pixel): (usize, &mut Pixel)| {
+            resolver.shade_sample(shader, &resolver.eye, (&buffer.sample(i), buffer.lit(i)), pixel)
         };
-        let mut counts: RayCounts =
-            self.pixels.par_iter_mut().enumerate().with_min_len(64).map(shade_pixel).sum();
+        let pixels = self.pixels.par_iter_mut().enumerate().with_min_len(64);
+        let mut counts: RayCounts = pixels.map_init(shader, shade_pixel).sum();
         for depth in 0..self.shaded.levels.len() {
             let (coarser, level) = self.shaded.levels.split_at_mut(depth);
             let (Some(level), Some(own)) = (level.first_mut(), buffer.finer.levels.get(depth)) else { break };
@@ -126,15 +128,16 @@ fn shade_level(
     let half = level.cells.side() as u32 / 2;
     let Level { cells, samples, lit, .. } = level;
     let places = cells.positions().par_iter().zip(samples).zip(lit.par_chunks_mut(stride)).zip(pixels);
-    let shade =
-        |(((&at, sample), lit), pixel): (((&Position, &mut SurfaceSample), &mut [u32]), &mut Pixel)| {
-            let found = stored.at(at).or_else(|| between(resolver, known, at, half));
-            let Some((found, bits)) = found else { return RayCounts::default() };
-            *sample = found;
-            lit[..words].copy_from_slice(bits);
-            resolver.shade_sample(&eye, sample, &lit[..words], pixel)
-        };
-    places.with_min_len(64).map(shade).sum()
+    let shader = || resolver.tracer.shader();
+    type Place<'p> = (((&'p Position, &'p mut SurfaceSample), &'p mut [u32]), &'p mut Pixel);
+    let shade = |shader: &mut Shader<'_, '_>, (((&at, sample), lit), pixel): Place<'_>| {
+        let found = stored.at(at).or_else(|| between(resolver, known, at, half));
+        let Some((found, bits)) = found else { return RayCounts::default() };
+        *sample = found;
+        lit[..words].copy_from_slice(bits);
+        resolver.shade_sample(shader, &eye, (sample, &lit[..words]), pixel)
+    };
+    places.with_min_len(64).map_init(shader, shade).sum()
 }
 
 /// The sample between others that lie on one surface under the same lights: no ray is needed to see it. Where the ray
@@ -180,11 +183,16 @@ impl Resolver<'_> {
         frame: &mut Frame,
     ) -> RayCounts {
         let counts = antialias.shade(self, buffer);
-        self.fill_rows(frame, buffer.width(), |pixel, _| {
-            let mut mean = Pixel::default();
-            antialias.visit(buffer, pixel, |number, weight| mean.add(&antialias.pixels[number], weight));
-            mean
-        });
+        self.fill_rows(
+            frame,
+            buffer.width(),
+            || (),
+            |(), pixel, _| {
+                let mut mean = Pixel::default();
+                antialias.visit(buffer, pixel, |number, weight| mean.add(&antialias.pixels[number], weight));
+                mean
+            },
+        );
         counts
     }
 

@@ -385,6 +385,7 @@ impl Emitter<'_> {
             let resolver = Resolver {
                 scene: self.scene,
                 settings: self.settings,
+                gain: self.settings.exposure.exp2(),
                 tracer,
                 eye: tracer.eye(&shot.view),
                 observer: &*self.observer,

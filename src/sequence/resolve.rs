@@ -6,7 +6,7 @@ use crate::accel::Displaced;
 use crate::frame::{Aov, Frame, FrameKind, FrameStats, Matte, RayCounts, SurfaceSample, Window};
 use crate::infer::BuzzBuffer;
 use crate::scene::{Scene, View};
-use crate::trace::{Eye, Tracer};
+use crate::trace::{Eye, Shader, Tracer};
 use glam::{DVec3, DVec4, Vec3, Vec4};
 use rayon::iter::Either;
 use rayon::prelude::*;
@@ -16,6 +16,8 @@ use std::sync::Arc;
 pub(super) struct Resolver<'a> {
     pub scene: &'a Scene,
     pub settings: &'a Settings,
+    /// What the settings' exposure multiplies radiance by.
+    pub gain: f32,
     pub tracer: &'a Tracer<'a>,
     /// Of the shot's view.
     pub eye: Eye,
@@ -102,14 +104,13 @@ impl Resolver<'_> {
         });
         let lights = if wants(Aov::Lights) { self.scene.lights.len() } else { 0 };
         frame.lights.resize_with(lights, Default::default);
-        let gain = self.settings.exposure.exp2();
         for (number, (name, layer)) in frame.lights.iter_mut().enumerate() {
             name.clone_from(&self.scene.lights[number].name);
             fill(layer, pixels, |i| match self.settings.aa {
                 ..2 => self.on_surface(buffer, i, |s| {
-                    self.tracer.light_diffuse(&self.eye, s, buffer.lit(i), number) * gain
+                    self.tracer.light_diffuse(&self.eye, s, buffer.lit(i), number) * self.gain
                 }),
-                _ => self.mean_light(buffer, antialias, i, number).map(|value| value * gain),
+                _ => self.mean_light(buffer, antialias, i, number).map(|value| value * self.gain),
             });
         }
         self.fill_mattes(buffer, &mut frame.mattes);
@@ -136,25 +137,28 @@ impl Resolver<'_> {
     }
 
     fn shade(&self, buffer: &BuzzBuffer, frame: &mut Frame) -> RayCounts {
-        self.fill_rows(frame, buffer.width(), |i, counts| {
-            self.pixel(&self.eye, &buffer.sample(i), buffer.lit(i), counts)
+        let shader = || self.tracer.shader();
+        self.fill_rows(frame, buffer.width(), shader, |shader, i, counts| {
+            self.pixel(shader, &self.eye, (&buffer.sample(i), buffer.lit(i)), counts)
         })
     }
 
-    /// Fills the layers that come from shading, row by row.
-    pub(super) fn fill_rows(
+    /// Fills the layers that come from shading, row by row; each row has a `state` of its own.
+    pub(super) fn fill_rows<S>(
         &self,
         frame: &mut Frame,
         width: usize,
-        value: impl Fn(usize, &mut RayCounts) -> Pixel + Sync,
+        state: impl Fn() -> S + Sync,
+        value: impl Fn(&mut S, usize, &mut RayCounts) -> Pixel + Sync,
     ) -> RayCounts {
         let fill_row = |y: usize, row: Row<'_>| {
             let mut counts = RayCounts::default();
             if self.observer.stop_requested().is_some() {
                 return counts;
             }
+            let mut state = state();
             for (x, color) in row.color.iter_mut().enumerate() {
-                let pixel = value(y * width + x, &mut counts);
+                let pixel = value(&mut state, y * width + x, &mut counts);
                 *color = pixel.color;
                 for (layer, value) in [
                     (&mut *row.diffuse, pixel.diffuse),
@@ -171,26 +175,31 @@ impl Resolver<'_> {
         rows(frame, width).enumerate().map(|(y, row)| fill_row(y, row)).sum()
     }
 
-    /// Shades a sample of a pixel or sub-pixel as wide as `eye` has them, unless the user asked to stop.
+    /// Shades a sample, under its shadow bits, of a pixel or sub-pixel as wide as `eye` has them, unless the user asked to stop.
     pub(super) fn shade_sample(
         &self,
+        shader: &mut Shader<'_, '_>,
         eye: &Eye,
-        sample: &SurfaceSample,
-        lit: &[u32],
+        seen: (&SurfaceSample, &[u32]),
         pixel: &mut Pixel,
     ) -> RayCounts {
         let mut counts = RayCounts::default();
         if self.observer.stop_requested().is_none() {
-            *pixel = self.pixel(eye, sample, lit, &mut counts);
+            *pixel = self.pixel(shader, eye, seen, &mut counts);
         }
         counts
     }
 
-    fn pixel(&self, eye: &Eye, sample: &SurfaceSample, lit: &[u32], counts: &mut RayCounts) -> Pixel {
-        let radiance = self.tracer.shade(eye, sample, lit, counts);
-        let gain = self.settings.exposure.exp2();
+    fn pixel(
+        &self,
+        shader: &mut Shader<'_, '_>,
+        eye: &Eye,
+        (sample, lit): (&SurfaceSample, &[u32]),
+        counts: &mut RayCounts,
+    ) -> Pixel {
+        let radiance = shader.shade(eye, sample, lit, counts);
         let (diffuse, specular, emission) =
-            (radiance.diffuse * gain, radiance.specular * gain, radiance.emission * gain);
+            (radiance.diffuse * self.gain, radiance.specular * self.gain, radiance.emission * self.gain);
         if sample.surface.is_background() && self.settings.transparent {
             return Pixel::default();
         }

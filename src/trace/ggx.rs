@@ -1,5 +1,6 @@
 //! The specular half of glTF 2.0's material model (Appendix B): GGX, height-correlated Smith, Fresnel.
 
+use super::lanes::{Lanes, Vec3x4};
 use glam::{Vec2, Vec3, Vec4, Vec4Swizzles};
 use std::f32::consts::PI;
 
@@ -9,6 +10,14 @@ pub(super) fn schlick(f0: Vec3, f90: f32, cos: f32) -> Vec3 {
     let x = (1.0 - cos).clamp(0.0, 1.0);
     let x2 = x * x;
     f0 + (Vec3::splat(f90) - f0) * (x2 * x2 * x)
+}
+
+/// How far Schlick's term is from normal incidence (0) to grazing (1).
+#[inline]
+pub(super) fn schlick_weights(cosines: Vec4) -> Vec4 {
+    let x = (Vec4::ONE - cosines).clamp(Vec4::ZERO, Vec4::ONE);
+    let x2 = x * x;
+    x2 * x2 * x
 }
 
 /// The Fresnel term of a smooth dielectric for unpolarised light; `eta` is the index of refraction on the far side over
@@ -39,23 +48,38 @@ pub(super) fn density(nh2: f32, a2: f32) -> f32 {
     a2 / (PI * d * d)
 }
 
-/// BRDF without its Fresnel term, and the cosine between view and half vector that the term needs.
-/// `None` where the lobe has less than `min` of density.
+/// BRDF without its Fresnel term for four lights, given as unit directions and their cosines to the normal, and the
+/// cosines between view and half vector that the term needs. 0 in lanes that are not `asked` for or have less than `min`
+/// of density; `None` where all are.
 #[inline]
-pub(super) fn lobe(normal: Vec3, view: Vec3, light: Vec3, alpha: f32, min: f32) -> Option<(f32, f32)> {
-    let half = view + light;
-    let (square, along) = (half.length_squared(), normal.dot(half).max(0.0));
+pub(super) fn lobes(
+    normal: Vec3,
+    view: Vec3,
+    (to_lights, cosines): (Vec3x4, Vec4),
+    alpha: f32,
+    min: f32,
+    asked: Lanes,
+) -> Option<(Vec4, Vec4)> {
+    let half = to_lights + Vec3x4::splat(view);
+    let square = half.length_squared();
+    let nv = normal.dot(view);
+    let along = (cosines + Vec4::splat(nv)).max(Vec4::ZERO);
     let a2 = alpha * alpha;
-    let density = density((along * along / square).min(1.0), a2);
-    // Opposite directions have no half vector: NaN.
-    if density.is_nan() || density < min {
+    // Opposite directions have no half vector: NaN, which `min` gives back only as its second argument.
+    let d = Vec4::ONE.min(along * along / square) * (a2 - 1.0) + Vec4::ONE;
+    let density = Vec4::splat(a2 / PI) / (d * d);
+    let counted = Lanes::above_zero(asked.select(density) - Vec4::splat(min));
+    if counted.is_empty() {
         return None;
     }
-    let half = half / square.sqrt();
-    let nl = normal.dot(light).clamp(0.0, 1.0);
-    let nv = normal.dot(view).abs().max(1e-4);
-    let shadowing = nl * (nv * nv * (1.0 - a2) + a2).sqrt() + nv * (nl * nl * (1.0 - a2) + a2).sqrt();
-    Some((density * 0.5 / shadowing.max(1e-6), view.dot(half).clamp(0.0, 1.0)))
+    let nl = cosines.clamp(Vec4::ZERO, Vec4::ONE);
+    let nv = nv.abs().max(1e-4);
+    let masked = (nl * nl * (1.0 - a2) + Vec4::splat(a2)).sqrt();
+    let shadowing = nl * (nv * nv * (1.0 - a2) + a2).sqrt() + nv * masked;
+    let lobes = density * 0.5 / shadowing.max(Vec4::splat(1e-6));
+    // Half of the half vector's length: both unit vectors lean from it alike.
+    let cos = (square.sqrt() * 0.5).min(Vec4::ONE);
+    Some((counted.select(lobes), cos))
 }
 
 /// Share of evenly lit surroundings that a rough surface mirrors: the split-sum scale and bias of `f0` and `f90`, in

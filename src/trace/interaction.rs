@@ -1,8 +1,7 @@
 //! The full record of a point on a surface: how it is turned, what its textures say.
 
-use super::point::{Side, SurfacePoint};
+use super::point::SurfacePoint;
 use crate::accel::{Accel, interpolate};
-use crate::frame::SurfaceRef;
 use crate::scene::{NormalTexture, Scene, TextureRef};
 use glam::{Vec2, Vec3, Vec3A};
 
@@ -29,38 +28,48 @@ impl Beam {
 pub(super) struct SurfaceInteraction<'a> {
     scene: &'a Scene,
     /// The point itself.
-    pub point: SurfacePoint<'a>,
+    pub point: &'a SurfacePoint<'a>,
     /// Unit shading normal on the side that is seen, normal map applied.
     pub normal: Vec3,
     /// Side of the square over which textures are averaged, metres.
     footprint: f32,
-    /// The first set of texture coordinates, and how many units of it there are to a metre.
-    uv: (Vec2, f32),
+    /// The first set of texture coordinates, where textures are asked.
+    uv: TextureCoordinates,
+}
+
+/// Texture coordinates at a point.
+#[derive(Clone, Copy, Default)]
+struct TextureCoordinates {
+    uv: Vec2,
+    /// By how much they grow along the triangle's edges.
+    along: [Vec2; 2],
+    /// How many units of them there are to a metre.
+    density: f32,
 }
 
 impl<'a> SurfaceInteraction<'a> {
-    /// The record of `surface`, which must be on a surface; `view` is the unit direction to the eye, which decides how
-    /// far a slanted footprint reaches.
+    /// The record of `point`; `view` is the unit direction to the eye, which decides how far a slanted footprint reaches.
+    /// Texture coordinates are found only if the material `is_textured`.
+    #[inline]
     pub fn new(
         scene: &'a Scene,
         accel: &'a Accel,
-        surface: SurfaceRef,
-        side: Side,
+        point: &'a SurfacePoint<'a>,
+        is_textured: bool,
         view: Vec3,
         beam: Beam,
     ) -> Self {
-        let point = SurfacePoint::new(scene, accel, surface, side);
-        // Seen at a slant, the footprint is an ellipse; a square of the same area stands for it.
-        let slant = point.geometric.dot(view).abs().max(0.05);
-        let (mesh, material) = (point.mesh, point.material);
+        let (mesh, surface) = (point.mesh, point.surface);
         let normal = point.geometric;
-        let footprint = beam.width / slant.sqrt();
-        let mut this = Self { scene, point, normal, footprint, uv: (Vec2::ZERO, 0.0) };
-        if !mesh.uvs.is_empty() && material.has_textures() {
+        let mut this = Self { scene, point, normal, footprint: 0.0, uv: TextureCoordinates::default() };
+        if is_textured {
+            // Seen at a slant, the footprint is an ellipse; a square of the same area stands for it.
+            let slant = normal.dot(view).abs().max(0.05);
+            this.footprint = beam.width / slant.sqrt();
             this.uv = this.coordinates(0);
         }
         let index = surface.instance as usize;
-        let placement = accel.placement(index);
+        let placement = this.point.placement;
         let corners = this.point.corners;
         let normals = accel.normals(index, mesh);
         if !normals.is_empty() {
@@ -68,7 +77,7 @@ impl<'a> SurfaceInteraction<'a> {
             let normal = placement.normals * interpolate(a, b, c, surface);
             this.normal = this.facing(Vec3::from(normal).normalize_or(this.point.geometric));
         }
-        if let Some(map) = &material.normal_texture {
+        if let Some(map) = &this.point.material.normal_texture {
             let tangents = accel.tangents(index, mesh);
             let tangent = (!tangents.is_empty()).then(|| {
                 let [a, b, c] = corners.map(|i| tangents[i]);
@@ -98,7 +107,8 @@ impl<'a> SurfaceInteraction<'a> {
         // Maps are meant for the front; from behind, the frame is the front's, mirrored as a whole.
         let normal = if self.point.front { self.normal } else { -self.normal };
         let (tangent, sign) = tangent.unwrap_or_else(|| self.tangent(map.texture.uv_set, normal));
-        let tangent = (tangent - normal * normal.dot(tangent)).normalize_or(normal.any_orthonormal_vector());
+        let tangent = (tangent - normal * normal.dot(tangent)).try_normalize();
+        let tangent = tangent.unwrap_or_else(|| normal.any_orthonormal_vector());
         let bitangent = normal.cross(tangent) * if sign < 0.0 { -1.0 } else { 1.0 };
         let mapped = (tangent * x + bitangent * y + normal * z).normalize_or(normal);
         let mapped = if self.point.front { mapped } else { -mapped };
@@ -112,32 +122,33 @@ impl<'a> SurfaceInteraction<'a> {
     /// Where u grows on the triangle, and the sign of the bitangent. Images hang with v downwards while normal maps
     /// have +Y up, so the bitangent is against v.
     fn tangent(&self, set: usize, normal: Vec3) -> (Vec3, f32) {
-        let Some(uvs) = self.point.mesh.uvs.get(set).filter(|uvs| !uvs.is_empty()) else {
-            return (Vec3::ZERO, 1.0);
-        };
-        let [a, b, c] = self.point.corners.map(|i| uvs[i]);
-        let (d1, d2) = (b - a, c - a);
+        let TextureCoordinates { along: [d1, d2], .. } = self.coordinates_of(set);
         let side = if d1.perp_dot(d2) < 0.0 { -1.0 } else { 1.0 };
         let along_u = (self.point.edges[0] * d2.y - self.point.edges[1] * d1.y) * side;
         let along_v = (self.point.edges[1] * d1.x - self.point.edges[0] * d2.x) * side;
         (along_u, if normal.cross(along_u).dot(along_v) > 0.0 { -1.0 } else { 1.0 })
     }
 
-    /// A set of texture coordinates, and how many units of it there are to a metre.
-    fn coordinates(&self, set: usize) -> (Vec2, f32) {
+    fn coordinates_of(&self, set: usize) -> TextureCoordinates {
+        if set == 0 { self.uv } else { self.coordinates(set) }
+    }
+
+    /// A set of texture coordinates; all zero where the mesh has no such set.
+    fn coordinates(&self, set: usize) -> TextureCoordinates {
         let Some(uvs) = self.point.mesh.uvs.get(set).filter(|uvs| !uvs.is_empty()) else {
-            return (Vec2::ZERO, 0.0);
+            return TextureCoordinates::default();
         };
         let [a, b, c] = self.point.corners.map(|i| uvs[i]);
-        let uv = a * self.point.weights[0] + b * self.point.weights[1] + c * self.point.weights[2];
-        let area = self.point.edges[0].cross(self.point.edges[1]).length();
-        let density = ((b - a).perp_dot(c - a).abs() / area).sqrt();
-        (uv, if density.is_finite() { density } else { 0.0 })
+        let [wa, wb, wc] = self.point.weights;
+        let along = [b - a, c - a];
+        let density = (along[0].perp_dot(along[1]).abs() / self.point.area).sqrt();
+        let density = if density.is_finite() { density } else { 0.0 };
+        TextureCoordinates { uv: a * wa + b * wb + c * wc, along, density }
     }
 
     /// The texture at this point, averaged over its footprint.
     pub fn texture(&self, texture: &TextureRef) -> glam::Vec4 {
-        let (uv, density) = if texture.uv_set == 0 { self.uv } else { self.coordinates(texture.uv_set) };
+        let TextureCoordinates { uv, density, .. } = self.coordinates_of(texture.uv_set);
         let scale = texture.transform.matrix2.determinant().abs();
         let scale = if scale == 1.0 { 1.0 } else { scale.sqrt() };
         let uv = texture.transform.transform_point2(uv);

@@ -9,7 +9,7 @@ use std::f32::consts::{PI, TAU};
 
 /// Nearer than this a light without size grows no brighter, metres: the inverse square would overflow. Far less than what
 /// is seen of a scene that is a millionth of a metre across.
-const MIN_DISTANCE: f32 = 1e-10;
+pub(super) const MIN_DISTANCE: f32 = 1e-10;
 
 /// An area light that covers less than this, in steradians, shines as if from its middle.
 const POINT_LIKE: f32 = 1e-6;
@@ -23,15 +23,15 @@ pub(super) const GRID: u32 = 4;
 /// A light prepared for many points.
 #[derive(Debug, Clone)]
 pub(super) struct Emitter {
-    shape: Shape,
+    pub shape: Shape,
     /// W/sr or W/m2; zero for a light that is out.
-    intensity: Vec3,
+    pub intensity: Vec3,
     /// One over the range; 0 where it is not limited.
-    per_range: f32,
+    pub per_range: f32,
 }
 
 #[derive(Debug, Clone)]
-enum Shape {
+pub(super) enum Shape {
     Sphere {
         position: Vec3,
         /// 0 for a light without size.
@@ -48,15 +48,15 @@ enum Shape {
 
 /// A spot's cone: intensity falls as `(cos * scale + offset)^2`, clamped to [0, 1].
 #[derive(Debug, Clone, Copy)]
-struct Cone {
-    direction: Vec3,
-    scale: f32,
-    offset: f32,
+pub(super) struct Cone {
+    pub direction: Vec3,
+    pub scale: f32,
+    pub offset: f32,
 }
 
 /// A flat light that shines from one side.
 #[derive(Debug, Clone)]
-struct Panel {
+pub(super) struct Panel {
     middle: Vec3,
     /// Half of its width and half of its height.
     right: Vec3,

@@ -2,20 +2,23 @@
 //! there. `docs/shading.md` has the model, its formulas and its cut-offs.
 //!
 //! The work is split as the paper splits it. [`Tracer::cast`] finds what does not depend on the eye and takes rays to
-//! know: the point, and which lights reach it. [`Tracer::shade`] adds the rest (the paper's *enhancement*): the light that
+//! know: the point, and which lights reach it. [`Shader::shade`] adds the rest (the paper's *enhancement*): the light that
 //! arrives, the texture under the pixel's beam, highlights, reflection, refraction. It is a function of the view, the
 //! sample and its shadow bits alone, whether the sample was just cast or carried over from another frame: so a still
 //! camera gives the same values frame after frame.
 
 mod changes;
+mod delta_lights;
 mod eye;
 mod form_factor;
 mod ggx;
 mod interaction;
+mod lanes;
 mod light;
 mod point;
 mod reach;
 mod sequence;
+mod shader;
 mod surface;
 mod visibility;
 mod whitted;
@@ -25,15 +28,18 @@ use crate::accel::{Accel, KnownTriangle, PreparedRay, Ray, Sides};
 use crate::frame::{PackedNormal, RayCounts, SurfaceRef, SurfaceSample};
 use crate::scene::{Pose, Scene, View};
 pub use changes::LightChanges;
+use delta_lights::{DeltaLights, is_delta};
 pub use eye::Eye;
 use glam::Vec3;
 use interaction::{Beam, SurfaceInteraction};
 use light::Emitter;
 use point::{Side, SurfacePoint};
+pub use shader::Shader;
+use shader::finite;
 use std::f32::consts::FRAC_1_PI;
-use surface::{Surface, occlusion};
+use surface::{ShadingMaterial, Surface, occlusion};
 use visibility::{Field, Inquiry, Layout};
-use whitted::{Incoming, Path};
+use whitted::Incoming;
 use world::Surroundings;
 
 /// Something this much nearer than a sample, as a share of its distance, hides it.
@@ -82,16 +88,32 @@ pub struct Tracer<'a> {
     accel: &'a Accel,
     options: TraceOptions,
     lights: Vec<Emitter>,
+    /// Those of them that never have a size.
+    delta_lights: Vec<DeltaLights>,
+    /// The numbers of the others: those that have a size, now or at some time.
+    sized_lights: Vec<usize>,
     layout: Layout,
     world: Surroundings<'a>,
+    /// In the order of the scene's materials.
+    materials: Vec<ShadingMaterial>,
 }
 
 impl<'a> Tracer<'a> {
     /// A tracer of `scene` as `accel` has it placed, under the lights of `pose`.
     pub fn new(scene: &'a Scene, accel: &'a Accel, pose: &Pose, options: TraceOptions) -> Self {
-        let lights = pose.lights.iter().map(|l| Emitter::new(l, accel.origin())).collect();
+        let lights: Vec<_> = pose.lights.iter().map(|l| Emitter::new(l, accel.origin())).collect();
         let layout = Layout::new(scene, options);
-        Self { scene, accel, options, lights, layout, world: Surroundings::new(scene) }
+        Self {
+            scene,
+            accel,
+            options,
+            delta_lights: DeltaLights::groups(&lights, &layout.lights),
+            sized_lights: (0..lights.len()).filter(|&n| !is_delta(&lights[n], layout.lights[n])).collect(),
+            lights,
+            layout,
+            world: Surroundings::new(scene),
+            materials: scene.materials.iter().map(ShadingMaterial::new).collect(),
+        }
     }
 
     /// The eye of a view, for everything that is asked of its pixels.
@@ -127,8 +149,7 @@ impl<'a> Tracer<'a> {
     /// Counts `shadow` and `ambient`.
     pub fn recast(&self, sample: &SurfaceSample, ask: &[u32], lit: &mut [u32], rays: &mut RayCounts) {
         if !sample.surface.is_background() {
-            let side = Side::Towards(sample.normal.direction());
-            let point = SurfacePoint::new(self.scene, self.accel, sample.surface, side);
+            let point = self.point_of(sample);
             self.look_for_lights(&point, |field, lit| field.inquiry(ask, lit), lit, rays);
         }
     }
@@ -261,38 +282,6 @@ impl<'a> Tracer<'a> {
         }
     }
 
-    /// What the eye sees of `sample`, whose shadow bits are `lit`: everything that depends on the eye is worked out
-    /// anew, for cast and reused samples alike. Counts `reflection` and `refraction`.
-    pub fn shade(&self, eye: &Eye, sample: &SurfaceSample, lit: &[u32], rays: &mut RayCounts) -> Radiance {
-        if sample.surface.is_background() {
-            let emission =
-                finite(self.world.radiance(sample.position, eye.pixel * f32::from(eye.perspective)));
-            return Radiance { emission, alpha: 1.0, ..Radiance::default() };
-        }
-        let (toward, beam) = eye.seen_from(sample.position);
-        let it = self.interaction(sample, toward, beam);
-        let surface = Surface::new(&it);
-        let mut incoming = Incoming::default();
-        if !it.point.material.unlit {
-            incoming = self.skylight(&it, self.layout.ambient.map_or(1.0, |field| field.share(lit)));
-            for (light, field) in self.lights.iter().zip(&self.layout.lights) {
-                if field.is_set(lit)
-                    && let Some(unshadowed) = light.unshadowed(it.point.position, it.normal)
-                {
-                    incoming.add(&it, &surface, toward, light, &unshadowed, field.share(lit));
-                }
-            }
-        }
-        let path = Path::new(beam);
-        let seen = self.leaving(&it, &surface, toward, &incoming, &path, rays);
-        Radiance {
-            diffuse: finite(seen.diffuse),
-            specular: finite(seen.specular),
-            emission: finite(seen.emission),
-            alpha: 1.0,
-        }
-    }
-
     /// Unit shading normal of a sample, normal map applied, turned to the side from which it was seen. Zero for
     /// the background.
     pub fn shading_normal(&self, eye: &Eye, sample: &SurfaceSample) -> Vec3 {
@@ -300,7 +289,7 @@ impl<'a> Tracer<'a> {
             return Vec3::ZERO;
         }
         let (toward, beam) = eye.seen_from(sample.position);
-        self.interaction(sample, toward, beam).normal
+        self.interaction(&self.point_of(sample), toward, beam).normal
     }
 
     /// The part of a sample's diffuse radiance that light number `light` brings, as far as it reaches it by `lit`.
@@ -310,13 +299,15 @@ impl<'a> Tracer<'a> {
             return Vec3::ZERO;
         }
         let (toward, beam) = eye.seen_from(sample.position);
-        let it = self.interaction(sample, toward, beam);
+        let point = self.point_of(sample);
+        let it = self.interaction(&point, toward, beam);
         let Some(unshadowed) = self.lights[light].unshadowed(it.point.position, it.normal) else {
             return Vec3::ZERO;
         };
-        let surface = Surface::new(&it);
+        let mut room = None;
+        let surface = self.surface(&it, &mut room);
         let irradiance = unshadowed.irradiance * share;
-        finite(surface.albedo * irradiance * FRAC_1_PI * self.coverage(&surface, 0))
+        finite(surface.albedo * irradiance * FRAC_1_PI * self.coverage(surface, 0))
     }
 
     /// True if something stands between the eye and a sample, nearer by more than a thousandth of its distance; for
@@ -340,9 +331,24 @@ impl<'a> Tracer<'a> {
         planar > 0.0 && self.accel.intersect(self.scene, &ray, Sides::Visible).is_some()
     }
 
-    fn interaction(&self, sample: &SurfaceSample, toward: Vec3, beam: Beam) -> SurfaceInteraction<'a> {
-        let side = Side::Towards(sample.normal.direction());
-        SurfaceInteraction::new(self.scene, self.accel, sample.surface, side, toward, beam)
+    fn point_of(&self, sample: &SurfaceSample) -> SurfacePoint<'a> {
+        SurfacePoint::new(self.scene, self.accel, sample.surface, Side::Towards(sample.normal.direction()))
+    }
+
+    #[inline]
+    fn interaction<'b>(
+        &'b self,
+        point: &'b SurfacePoint<'b>,
+        toward: Vec3,
+        beam: Beam,
+    ) -> SurfaceInteraction<'b> {
+        let is_textured = self.materials[point.mesh.material].is_textured;
+        SurfaceInteraction::new(self.scene, self.accel, point, is_textured, toward, beam)
+    }
+
+    /// What the material says at a point; `room` holds what is not the same everywhere.
+    fn surface<'b>(&'b self, it: &SurfaceInteraction, room: &'b mut Option<Surface>) -> &'b Surface {
+        self.materials[it.point.mesh.material].surface(it, room)
     }
 
     /// What arrives from the world, of which `share` reaches the point.
@@ -359,10 +365,4 @@ impl<'a> Tracer<'a> {
 /// several rays are cast to it; and eight for the world if any is cast to that.
 pub fn lit_words(scene: &Scene, options: TraceOptions) -> usize {
     Layout::new(scene, options).words
-}
-
-/// `light`, or nothing where arithmetic on extreme input has overflowed: one such pixel would spoil every filter
-/// after us.
-fn finite(light: Vec3) -> Vec3 {
-    if light.is_finite() { light } else { Vec3::ZERO }
 }

@@ -1,7 +1,7 @@
 //! A point on a surface: where it is and which way the surface lies, before any texture is asked.
 
 use super::sequence::hash;
-use crate::accel::{Accel, Placement, interpolate};
+use crate::accel::{Accel, Placement};
 use crate::frame::SurfaceRef;
 use crate::scene::{Material, Mesh, Scene};
 use glam::{Vec3, Vec3A};
@@ -21,17 +21,21 @@ pub(super) struct SurfacePoint<'a> {
     pub weights: [f32; 3],
     /// The triangle's edges from its first corner.
     pub edges: [Vec3; 2],
+    /// Area of the parallelogram that the edges span.
+    pub area: f32,
     pub position: Vec3,
     /// Unit geometric normal on the side that is seen.
     pub geometric: Vec3,
     /// Whether the side that is seen is the front.
     pub front: bool,
-    placement: &'a Placement,
-    /// How large the object's coordinates were that it was computed from.
-    magnitude: Vec3A,
+    pub placement: &'a Placement,
+    /// The triangle's corners in object space; of a shape, the point itself.
+    positions: [Vec3A; 3],
+    /// Unit geometric normal on the front.
+    outward: Vec3,
     /// Metres to stay away from the surface; most points that are only shaded are never asked.
     offset: OnceCell<f32>,
-    surface: SurfaceRef,
+    pub surface: SurfaceRef,
 }
 
 /// Which side of a surface is looked at.
@@ -57,41 +61,65 @@ impl<'a> SurfacePoint<'a> {
     pub fn new(scene: &'a Scene, accel: &'a Accel, surface: SurfaceRef, side: Side) -> Self {
         let index = surface.instance as usize;
         let mesh = &scene.meshes[scene.instances[index].mesh];
-        let material = &scene.materials[mesh.material];
         let placement = accel.placement(index);
         let m = &placement.render_from_object;
-        let (corners, weights, edges, position, outward, magnitude);
+        let (corners, positions, edges, area, outward);
         if let Some(shape) = &mesh.shape {
-            let (local, _) = shape.point(surface);
-            (corners, weights, edges) = ([0; 3], [0.0; 3], [Vec3::ZERO; 2]);
-            position = m.transform_point3(local);
+            (corners, edges, area) = ([0; 3], [Vec3::ZERO; 2], 0.0);
+            positions = [shape.point(surface).0.into(); 3];
             outward = accel.shape_normal(scene, surface).unwrap_or(Vec3::Y);
-            magnitude = local.abs().into();
         } else {
             corners = mesh.triangles[surface.primitive as usize].map(|i| i as usize);
-            let positions = accel.positions(index, mesh);
-            let [a, b, c] = corners.map(|i| Vec3A::from(positions[i]));
-            weights = [1.0 - surface.u - surface.v, surface.u, surface.v];
-            position = m.transform_point3a(interpolate(a, b, c, surface)).into();
+            let posed = accel.positions(index, mesh);
+            positions = corners.map(|i| Vec3A::from(posed[i]));
+            let [a, b, c] = positions;
             edges = [b - a, c - a].map(|e| Vec3::from(m.transform_vector3a(e)));
-            outward = edges[0].cross(edges[1]).normalize_or(Vec3::Y) * placement.winding;
-            magnitude = a.abs() * weights[0] + b.abs() * weights[1] + c.abs() * weights[2];
+            let across = edges[0].cross(edges[1]);
+            area = across.length();
+            outward = across.normalize_or(Vec3::Y) * placement.winding;
         }
-        let front = side.is_front(outward);
-        Self {
+        let mut this = Self {
             mesh,
-            material,
+            material: &scene.materials[mesh.material],
             corners,
-            weights,
+            weights: [1.0, 0.0, 0.0],
             edges,
-            position,
-            geometric: if front { outward } else { -outward },
-            front,
+            area,
+            position: Vec3::ZERO,
+            geometric: outward,
+            front: true,
             placement,
-            magnitude,
+            positions,
+            outward,
             offset: OnceCell::new(),
             surface,
+        };
+        this.place(surface, side);
+        this
+    }
+
+    /// Moves to another point of the same triangle; false, and nowhere, if `surface` is not on it. It is then what
+    /// [`SurfacePoint::new`] gives, for less work.
+    pub fn move_to(&mut self, surface: SurfaceRef, side: Side) -> bool {
+        let primitive = |s: &SurfaceRef| (s.instance, s.primitive);
+        let stays = primitive(&surface) == primitive(&self.surface) && self.mesh.shape.is_none();
+        if stays {
+            self.offset = OnceCell::new();
+            self.place(surface, side);
         }
+        stays
+    }
+
+    fn place(&mut self, surface: SurfaceRef, side: Side) {
+        if self.mesh.shape.is_none() {
+            self.weights = [1.0 - surface.u - surface.v, surface.u, surface.v];
+        }
+        let [a, b, c] = self.positions;
+        let [wa, wb, wc] = self.weights;
+        self.position = self.placement.render_from_object.transform_point3a(a * wa + b * wb + c * wc).into();
+        self.front = side.is_front(self.outward);
+        self.geometric = if self.front { self.outward } else { -self.outward };
+        self.surface = surface;
     }
 
     /// A number that says nothing but which point this is: what is left to chance here is decided by it, and so the
@@ -105,7 +133,8 @@ impl<'a> SurfacePoint<'a> {
     pub fn start(&self, direction: Vec3) -> Vec3 {
         let offset = *self.offset.get_or_init(|| {
             let m = &self.placement.render_from_object;
-            let magnitude = m.matrix3.abs() * self.magnitude + m.translation.abs();
+            let [[a, b, c], [wa, wb, wc]] = [self.positions.map(Vec3A::abs), self.weights.map(Vec3A::splat)];
+            let magnitude = m.matrix3.abs() * (a * wa + b * wb + c * wc) + m.translation.abs();
             let roundings = OFFSET_ROUNDINGS * f32::EPSILON * 0.5;
             (magnitude.max_element() + self.placement.fused_reach) * roundings
         });

@@ -1,6 +1,6 @@
 //! What a material says at a point: the inputs of the shading model, textures applied.
 
-use super::ggx::{dielectric, schlick};
+use super::ggx::{dielectric, schlick, schlick_weights};
 use super::interaction::SurfaceInteraction;
 use crate::scene::{AlphaMode, MIRROR_ROUGHNESS, Material, TextureRef};
 use glam::{Vec3, Vec4};
@@ -12,6 +12,7 @@ const FULL_MIRROR_ROUGHNESS: f32 = 0.1;
 const MIN_HIGHLIGHT_ROUGHNESS: f32 = 0.08;
 
 /// A material's parameters at a point.
+#[derive(Debug, Clone)]
 pub(super) struct Surface {
     /// Base colour of the part that scatters, not that which mirrors or transmits.
     pub albedo: Vec3,
@@ -19,6 +20,10 @@ pub(super) struct Surface {
     /// 1, or less where the material is blended with what is behind.
     pub coverage: f32,
     pub roughness: f32,
+    /// GGX's alpha for highlights.
+    pub alpha: f32,
+    /// Share of the reflection that is a mirror image; the rest is blurred.
+    pub mirror: f32,
     /// Reflectance at normal incidence and at grazing.
     pub f0: Vec3,
     pub f90: f32,
@@ -28,11 +33,41 @@ pub(super) struct Surface {
     pub eta: Option<f32>,
 }
 
+/// A material prepared for many points.
+#[derive(Debug)]
+pub(super) struct ShadingMaterial {
+    /// Whether any of its inputs is a texture.
+    pub is_textured: bool,
+    /// The surface where textures and vertex colours are white: from the front, and from the back.
+    plain: [Surface; 2],
+}
+
+impl ShadingMaterial {
+    pub fn new(material: &Material) -> Self {
+        let plain = |front| Surface::new(material, front, Vec4::ONE, |_| Vec4::ONE);
+        Self { is_textured: material.has_textures(), plain: [plain(true), plain(false)] }
+    }
+
+    /// The surface at a point; `room` holds it where it is not the same everywhere.
+    #[inline]
+    pub fn surface<'a>(&'a self, it: &SurfaceInteraction, room: &'a mut Option<Surface>) -> &'a Surface {
+        if !self.is_textured && it.point.mesh.colors.is_empty() {
+            return &self.plain[usize::from(!it.point.front)];
+        }
+        room.insert(Surface::new(it.point.material, it.point.front, it.vertex_color(), |t| it.texture(t)))
+    }
+}
+
 impl Surface {
-    pub fn new(it: &SurfaceInteraction) -> Self {
-        let material = it.point.material;
-        let texture = |t: &Option<TextureRef>| t.as_ref().map_or(Vec4::ONE, |t| it.texture(t));
-        let base = material.base_color * texture(&material.base_color_texture) * it.vertex_color();
+    /// The surface where vertex colours and textures have these values, seen from the front or from the back.
+    fn new(
+        material: &Material,
+        front: bool,
+        vertex_color: Vec4,
+        texture: impl Fn(&TextureRef) -> Vec4,
+    ) -> Self {
+        let texture = |t: &Option<TextureRef>| t.as_ref().map_or(Vec4::ONE, &texture);
+        let base = material.base_color * texture(&material.base_color_texture) * vertex_color;
         let color = base.truncate();
         let coverage = if material.alpha_mode == AlphaMode::Blend { base.w.clamp(0.0, 1.0) } else { 1.0 };
         if material.unlit {
@@ -41,6 +76,8 @@ impl Surface {
                 emission: color,
                 coverage,
                 roughness: 1.0,
+                alpha: 1.0,
+                mirror: 0.0,
                 f0: Vec3::ZERO,
                 f90: 0.0,
                 transmittance: Vec3::ZERO,
@@ -49,6 +86,7 @@ impl Surface {
         }
         let rough_metal = texture(&material.metallic_roughness_texture);
         let metallic = (material.metallic * rough_metal.z).clamp(0.0, 1.0);
+        let roughness = (material.roughness * rough_metal.y).clamp(0.0, 1.0);
         let mut emission = material.emissive;
         if emission != Vec3::ZERO {
             emission *= texture(&material.emissive_texture).truncate();
@@ -67,11 +105,13 @@ impl Surface {
             albedo: color * ((1.0 - metallic) * (1.0 - transmission)),
             emission,
             coverage,
-            roughness: (material.roughness * rough_metal.y).clamp(0.0, 1.0),
+            roughness,
+            alpha: roughness.max(MIN_HIGHLIGHT_ROUGHNESS).powi(2),
+            mirror: mirror(roughness),
             f0: dielectric_f0.lerp(color, metallic),
             f90: specular + (1.0 - specular) * metallic,
             transmittance: color * ((1.0 - metallic) * transmission),
-            eta: bends.then_some(if it.point.front { ior } else { 1.0 / ior }),
+            eta: bends.then_some(if front { ior } else { 1.0 / ior }),
         }
     }
 
@@ -84,17 +124,26 @@ impl Surface {
         }
     }
 
-    /// Share of the reflection that is a mirror image; the rest is blurred.
-    pub fn mirror(&self) -> f32 {
-        let t = (MIRROR_ROUGHNESS - self.roughness) / (MIRROR_ROUGHNESS - FULL_MIRROR_ROUGHNESS);
-        let t = t.clamp(0.0, 1.0);
-        t * t * (3.0 - 2.0 * t)
+    /// The Fresnel term for four cosines, each as a weight between reflectances, which are the same for all.
+    #[inline]
+    pub fn fresnel4(&self, cosines: Vec4) -> (Vec4, [Vec3; 2]) {
+        match self.eta {
+            Some(eta) => (cosines.map(|cos| dielectric(cos, eta)), [Vec3::ZERO, Vec3::ONE]),
+            None => (schlick_weights(cosines), [self.f0, Vec3::splat(self.f90)]),
+        }
     }
 
-    /// GGX's alpha for highlights.
-    pub fn alpha(&self) -> f32 {
-        self.roughness.max(MIN_HIGHLIGHT_ROUGHNESS).powi(2)
+    /// Whether lights have highlights on it: not inside a solid, nor where nothing is reflected.
+    pub fn has_highlights(&self) -> bool {
+        self.f90 != 0.0 && self.eta.is_none_or(|eta| eta >= 1.0)
     }
+}
+
+/// Share of the reflection that is a mirror image.
+fn mirror(roughness: f32) -> f32 {
+    let t = (MIRROR_ROUGHNESS - roughness) / (MIRROR_ROUGHNESS - FULL_MIRROR_ROUGHNESS);
+    let t = t.clamp(0.0, 1.0);
+    t * t * (3.0 - 2.0 * t)
 }
 
 /// Ambient light that occlusion leaves, 0 to 1.

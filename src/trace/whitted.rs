@@ -1,15 +1,17 @@
 //! What leaves a surface towards the eye, and the rays that have to be followed to know it.
 
-use super::ggx::{density, environment_share, lobe, refract};
+use super::delta_lights::{DeltaLights, Unshadowed4};
+use super::ggx::{density, environment_share, lobes, refract};
 use super::interaction::{Beam, SurfaceInteraction};
+use super::lanes::{Lanes, Vec3x4};
 use super::light::{Emitter, GRID, Unshadowed};
-use super::point::Side;
+use super::point::{Side, SurfacePoint};
 use super::surface::Surface;
 use super::visibility::Inquiry;
 use super::{Radiance, Tracer};
 use crate::accel::{Ray, Sides};
 use crate::frame::RayCounts;
-use glam::Vec3;
+use glam::{Vec3, Vec4};
 use std::f32::consts::{FRAC_1_PI, TAU};
 
 /// A ray is followed only if it carries more than this share of what it finds to the pixel.
@@ -73,7 +75,39 @@ pub(super) struct Incoming {
 }
 
 impl Incoming {
-    /// Adds the `share` of a light that reaches the point.
+    /// Adds those of four lights without size that are `asked` for and `reach` the point, which is not asked of lights
+    /// that would bring nothing to the eye.
+    #[inline]
+    pub fn add_four(
+        &mut self,
+        it: &SurfaceInteraction,
+        surface: &Surface,
+        toward: Vec3,
+        lights: &DeltaLights,
+        asked: Lanes,
+        reach: impl FnOnce(Lanes) -> Lanes,
+    ) {
+        let Unshadowed4 { strengths, to_lights, cosines } = lights.unshadowed(it.point.position, it.normal);
+        let shining = Lanes::above_zero(asked.select(strengths));
+        let mut mirrored = None;
+        if surface.has_highlights() {
+            mirrored = lobes(it.normal, toward, (to_lights, cosines), surface.alpha, MIN_LOBE, shining);
+        }
+        let seen = match mirrored {
+            _ if surface.albedo != Vec3::ZERO => shining,
+            Some((lobes, _)) => Lanes::above_zero(lobes),
+            None => return,
+        };
+        let light = reach(seen).select(strengths);
+        self.irradiance += lights.sum(light);
+        if let Some((lobes, cosines)) = mirrored {
+            let (grazing, [f0, f90]) = surface.fresnel4(cosines);
+            let (light, grazing) = (light * lobes, light * lobes * grazing);
+            self.highlights += lights.sum(light - grazing) * f0 + lights.sum(grazing) * f90;
+        }
+    }
+
+    /// Adds the `share` of a light that has a size that reaches the point.
     pub fn add(
         &mut self,
         it: &SurfaceInteraction,
@@ -89,7 +123,7 @@ impl Incoming {
 }
 
 impl Surface {
-    /// The highlight of a light, nothing in its way.
+    /// The highlight of a light that has a size, nothing in its way.
     fn highlight(
         &self,
         it: &SurfaceInteraction,
@@ -97,23 +131,21 @@ impl Surface {
         light: &Emitter,
         unshadowed: &Unshadowed,
     ) -> Vec3 {
-        // Inside a solid, and where nothing is reflected, there is none.
-        if self.f90 == 0.0 || self.eta.is_some_and(|eta| eta < 1.0) {
+        if !self.has_highlights() {
             return Vec3::ZERO;
         }
-        let mirrored = |alpha: f32, to_light: Vec3| match lobe(it.normal, toward, to_light, alpha, MIN_LOBE) {
-            Some((lobe, cos)) => unshadowed.irradiance * lobe * self.fresnel(cos),
-            None => Vec3::ZERO,
+        let mirrored = |alpha: f32, to_light: Vec3| {
+            let lights = (Vec3x4::splat(to_light), Vec4::splat(it.normal.dot(to_light)));
+            match lobes(it.normal, toward, lights, alpha, MIN_LOBE, Lanes::ALL) {
+                Some((lobes, cos)) => unshadowed.irradiance * lobes.x * self.fresnel(cos.x),
+                None => Vec3::ZERO,
+            }
         };
-        let alpha = self.alpha();
-        if !light.has_size() {
-            return mirrored(alpha, unshadowed.to_light);
-        }
         // A light is cut in parts narrower than the lobe, as far as a few will do, and the lobe is widened by their size.
         let position = it.point.position;
         let spread = light.solid_angle(position) / TAU;
-        let rows = (4.0 * spread.sqrt() / alpha).ceil().clamp(1.0, GRID as f32);
-        let alpha = (alpha * alpha + spread / (rows * rows)).sqrt();
+        let rows = (4.0 * spread.sqrt() / self.alpha).ceil().clamp(1.0, GRID as f32);
+        let alpha = (self.alpha * self.alpha + spread / (rows * rows)).sqrt();
         let middle = unshadowed.to_light;
         if rows == 1.0 {
             return if it.normal.dot(middle) > 0.0 { mirrored(alpha, middle) } else { Vec3::ZERO };
@@ -194,8 +226,12 @@ impl Tracer<'_> {
         path: &Path,
         rays: &mut RayCounts,
     ) -> Vec3 {
+        let sharp = surface.mirror;
+        let blurs = sharp < 1.0 && !self.world.is_black();
+        if sharp == 0.0 && !blurs {
+            return Vec3::ZERO;
+        }
         let cos = it.normal.dot(toward).clamp(0.0, 1.0);
-        let sharp = surface.mirror();
         let mut direction = it.normal * (2.0 * it.normal.dot(toward)) - toward;
         let below = direction.dot(it.point.geometric);
         if below < 0.0 {
@@ -210,7 +246,7 @@ impl Tracer<'_> {
                 light += share * self.follow(it, direction, path, next, rays);
             }
         }
-        if sharp < 1.0 && !self.world.is_black() {
+        if blurs {
             let share = environment_share(surface.f0, surface.f90, surface.roughness, cos) * (1.0 - sharp);
             let angle = 2.0 * surface.roughness * surface.roughness;
             light += share * self.world.radiance(direction, angle) * openness;
@@ -271,26 +307,33 @@ impl Tracer<'_> {
             passed = (path.inside * -hit.t).exp();
             path.share *= passed;
         }
-        let side = Side::Front(hit.front);
-        let it = SurfaceInteraction::new(self.scene, self.accel, hit.surface, side, -direction, path.beam);
-        let surface = Surface::new(&it);
+        let point = SurfacePoint::new(self.scene, self.accel, hit.surface, Side::Front(hit.front));
+        let it = self.interaction(&point, -direction, path.beam);
+        let mut room = None;
+        let surface = self.surface(&it, &mut room);
         let mut incoming = Incoming::default();
         if !it.point.material.unlit {
             // As few rays as the path brings little to the pixel.
             let inquiry = Inquiry::Part(path.share.max_element());
-            let openness = |_| self.world_share(&it.point, inquiry, || path.count(rays));
+            let openness = |_| self.world_share(&point, inquiry, || path.count(rays));
             let ambient = self.layout.ambient.map_or(1.0, openness);
             incoming = self.skylight(&it, ambient);
-            for (number, light) in self.lights.iter().enumerate() {
+            let mut share = |number| self.light_share(&point, number, inquiry, || path.count(rays));
+            for lights in &self.delta_lights {
+                let reach = |lanes: Lanes| lanes.filter(|lane| share(lights.number(lane)) > 0.0);
+                incoming.add_four(&it, surface, -direction, lights, Lanes::ALL, reach);
+            }
+            for &number in &self.sized_lights {
+                let light = &self.lights[number];
                 if let Some(unshadowed) = light.unshadowed(it.point.position, it.normal) {
-                    let share = self.light_share(&it.point, number, inquiry, || path.count(rays));
+                    let share = share(number);
                     if share > 0.0 {
-                        incoming.add(&it, &surface, -direction, light, &unshadowed, share);
+                        incoming.add(&it, surface, -direction, light, &unshadowed, share);
                     }
                 }
             }
         }
-        passed * self.leaving(&it, &surface, -direction, &incoming, &path, rays).total()
+        passed * self.leaving(&it, surface, -direction, &incoming, &path, rays).total()
     }
 }
 

@@ -142,17 +142,15 @@ fn a_scene_far_away_looks_the_same() {
 #[test]
 fn shading_is_a_function_of_the_sample_alone() {
     let (a, b) = (Rig::new(medley(DVec3::ZERO)), Rig::new(medley(DVec3::ZERO)));
+    let (tracer, view) = (a.tracer(), a.view());
+    // One that has shaded others before.
+    let (mut shader, eye) = (tracer.shader(), tracer.eye(&view));
     for y in 0..65 {
         for x in 0..65 {
             let (x, y) = (f64::from(x) + 0.5, f64::from(y) + 0.5);
             let (one, other) = (a.pixel(x, y), b.pixel(x, y));
             assert_eq!((one.sample, &one.lit, one.radiance), (other.sample, &other.lit, other.radiance));
-            let again = a.tracer().shade(
-                &a.tracer().eye(&a.view()),
-                &one.sample,
-                &one.lit,
-                &mut RayCounts::default(),
-            );
+            let again = shader.shade(&eye, &one.sample, &one.lit, &mut RayCounts::default());
             assert_eq!(again, one.radiance);
         }
     }
