@@ -75,7 +75,7 @@ impl Shader<'_, '_> {
             let emission = finite(tracer.world.radiance(sample.position, angle));
             return Radiance { emission, alpha: 1.0, ..Radiance::default() };
         }
-        let side = || Side::Towards(sample.normal.get());
+        let side = || Side::Towards(sample.normal.direction());
         if !last.as_mut().is_some_and(|point| point.move_to(sample.surface, side())) {
             *last = None;
         }
