@@ -43,6 +43,16 @@ pub trait CastCentres: CastRays {
         }
     }
 
+    /// True if two samples' shadow bits mean the same: [`CastCentres::differ`] would set none.
+    fn agree(&self, a: &[u32], b: &[u32]) -> bool {
+        a == b
+    }
+
+    /// True if an edge of a shadow may lie between two samples.
+    fn has_edge(&self, a: &[u32], b: &[u32]) -> bool {
+        a != b
+    }
+
     /// Whether any of a sample's bits are numbers: shares of light.
     fn has_shares(&self) -> bool {
         false
@@ -129,7 +139,7 @@ impl Centring {
         let rows = new.rows_mut().zip(self.ask.par_chunks_mut((width * words).max(1)));
         rows.enumerate().for_each(|(y, (mut row, ask))| {
             ask.fill(0);
-            for (x, alike) in sources.alike(old, y).enumerate() {
+            for (x, alike) in sources.alike(old, y, rays).enumerate() {
                 let (pixel, ask) = (y * width + x, &mut ask[x * words..][..words]);
                 let own = sources.of(pixel);
                 row.object[x] = UNKNOWN;
@@ -145,13 +155,18 @@ impl Centring {
                 if sources.is_suspect(pixel) {
                     continue;
                 }
-                // Within a triangle that is lit the same all around there is no more to find out.
-                if let Some(Alike { source, moved }) = alike {
+                // Within a triangle that is lit alike all around there is no more to find out.
+                if let Some(Alike { source, moved, same }) = alike {
                     let sample = old.sample(source);
                     let centred =
                         if moved { rays.nearest_of(x, y, std::iter::once(sample)) } else { Some(sample) };
                     match centred {
-                        Some(sample) => reuse(source, &sample),
+                        Some(sample) => {
+                            reuse(source, &sample);
+                            if moved && !same {
+                                carry((old, source), view, (x, y), &sample, rays, (row.lit_mut(x), ask));
+                            }
+                        }
                         None => row.class[x] = PixelClass::Edge,
                     }
                     continue;

@@ -41,7 +41,10 @@ pub(super) fn carry(
         let weight = (1.0 - (column - left).abs()) * (1.0 - (row - top).abs());
         // The bars of a window and the panes behind them are two things, though they are within a pixel's width.
         let is_same_thing = old.surface[pixel].instance == sample.surface.instance;
-        (pixel, if is_same_thing && tangent.may_lend(&old.sample(pixel)) { weight } else { 0.0 })
+        let is_same_face =
+            old.surface[pixel].primitive == sample.surface.primitive && old.normal[pixel] == sample.normal;
+        let lends = is_same_thing && (is_same_face || tangent.may_lend(&old.sample(pixel)));
+        (pixel, if lends { weight } else { 0.0 })
     });
     let mut known = corners.iter().filter(|&&(_, weight)| weight > 0.0);
     rays.blend(known.clone().map(|&(pixel, weight)| (old.lit(pixel), weight)), lit);

@@ -76,6 +76,14 @@ impl CastCentres for Caster<'_> {
         self.tracer.differ(a, b, differ);
     }
 
+    fn agree(&self, a: &[u32], b: &[u32]) -> bool {
+        self.tracer.agree(a, b)
+    }
+
+    fn has_edge(&self, a: &[u32], b: &[u32]) -> bool {
+        self.tracer.has_edge(a, b)
+    }
+
     fn has_shares(&self) -> bool {
         self.tracer.has_shares()
     }

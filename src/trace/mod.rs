@@ -139,6 +139,16 @@ impl<'a> Tracer<'a> {
         self.layout.differ(a, b, differ);
     }
 
+    /// True if [`Tracer::differ`] sets no bit.
+    pub fn agree(&self, a: &[u32], b: &[u32]) -> bool {
+        self.layout.agree(a, b)
+    }
+
+    /// True if an edge of a light's shadow may lie between two samples. The world throws none.
+    pub fn has_edge(&self, a: &[u32], b: &[u32]) -> bool {
+        self.layout.has_edge(a, b)
+    }
+
     /// Whether samples have shares of any light, not only bits.
     pub fn has_shares(&self) -> bool {
         self.layout.has_shares()

@@ -3,7 +3,7 @@
 
 use super::TraceOptions;
 use crate::scene::Scene;
-use glam::Vec3;
+use glam::{U8Vec4, Vec3, Vec4};
 
 /// Where in the words of every sample each light is found.
 #[derive(Debug, Clone)]
@@ -14,8 +14,8 @@ pub(super) struct Layout {
     pub ambient: Option<Field>,
     /// Words of a sample.
     pub words: usize,
-    /// The fields that hold shares, and by how much two of them may differ and mean the same.
-    shares: Vec<(Field, f32)>,
+    /// The fields that hold shares, the world's last, and by how many of 255 steps two of them may differ and mean the same.
+    shares: Vec<(Field, u32)>,
     /// For each word, the bits that are none of a share's.
     single_bits: Vec<u32>,
     /// For each word, those and the lowest bit of each share: what asks to confirm shares, and for all else.
@@ -33,8 +33,8 @@ pub(super) enum Inquiry {
     Confirm(f32),
 }
 
-/// Shares that are farther apart are on two sides of an edge, and say nothing about what is between them.
-const EDGE: f32 = 0.5;
+/// Shares that are farther apart, in 255 steps, are on two sides of an edge, and say nothing about what is between them.
+const EDGE: u32 = 127;
 
 /// One light's bits, all in one word.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
@@ -59,7 +59,7 @@ impl Layout {
         }
         let has_ambient = options.ambient_samples > 0 && scene.world.color != Vec3::ZERO;
         let ambient = has_ambient.then(|| Field::at(&mut bits, 8));
-        let mut shares: Vec<(Field, f32)> = Vec::new();
+        let mut shares: Vec<(Field, u32)> = Vec::new();
         let soft = lights.iter().filter(|field| field.whole > 1);
         shares.extend(soft.map(|&field| (field, noise(options.light_samples))));
         shares.extend(ambient.map(|field| (field, noise(options.ambient_samples))));
@@ -101,12 +101,15 @@ impl Layout {
 
     /// Sets the shares in `lit` to the mean of those in `known`, each with its weight. Single bits stay.
     pub fn blend<'a>(&self, known: impl Iterator<Item = (&'a [u32], f32)> + Clone, lit: &mut [u32]) {
-        for &(field, _) in &self.shares {
-            let add = |(sum, all), (words, weight)| (sum + weight * field.share(words), all + weight);
-            let (sum, all) = known.clone().fold((0.0, 0.0), add);
-            if all > 0.0 {
-                field.set(lit, sum / all);
-            }
+        let all: f32 = known.clone().map(|(_, weight)| weight).sum();
+        if all == 0.0 {
+            return;
+        }
+        for (word, (lit, single)) in lit.iter_mut().zip(&self.single_bits).enumerate() {
+            let shares = |words: &[u32]| U8Vec4::from_array(words[word].to_le_bytes()).as_vec4();
+            let sum: Vec4 = known.clone().map(|(words, weight)| shares(words) * weight).sum();
+            let mean = (sum / all + 0.5).as_u8vec4();
+            *lit = *lit & single | u32::from_le_bytes(mean.to_array()) & !single;
         }
     }
 
@@ -116,20 +119,37 @@ impl Layout {
         for (((differ, a), b), single) in differ.iter_mut().zip(a).zip(b).zip(&self.single_bits) {
             *differ |= (a ^ b) & single;
         }
-        for (field, noise) in &self.shares {
-            let apart = (field.share(a) - field.share(b)).abs();
-            if apart > *noise {
+        for &(field, noise) in &self.shares {
+            let apart = field.apart(a, b);
+            if apart > noise {
                 let bits = if apart > noise.max(EDGE) { field.whole } else { 1 };
                 differ[field.word] |= bits << field.shift;
             }
         }
     }
+
+    /// True if `a` and `b` mean the same in all fields.
+    pub fn agree(&self, a: &[u32], b: &[u32]) -> bool {
+        self.is_single_alike(a, b) && self.shares.iter().all(|&(field, noise)| field.apart(a, b) <= noise)
+    }
+
+    /// True if `a` and `b` may be on two sides of the edge of a light's shadow.
+    pub fn has_edge(&self, a: &[u32], b: &[u32]) -> bool {
+        let lights = &self.shares[..self.shares.len() - usize::from(self.ambient.is_some())];
+        let is_edge = |&(field, noise): &(Field, u32)| field.apart(a, b) > noise.max(EDGE);
+        !self.is_single_alike(a, b) || lights.iter().any(is_edge)
+    }
+
+    fn is_single_alike(&self, a: &[u32], b: &[u32]) -> bool {
+        a.iter().zip(b).zip(&self.single_bits).all(|((a, b), single)| (a ^ b) & single == 0)
+    }
 }
 
-/// What two shares from so many rays may differ by though they are of the same truth: some three standard deviations
-/// where an edge crosses the light. None and all of it never are the same.
-fn noise(samples: u32) -> f32 {
-    (2.0 * (samples as f32).powf(-0.75)).min(0.99)
+/// What two shares from so many rays may differ by though they are of the same truth, in 255 steps: some three standard
+/// deviations where an edge crosses the light. None and all of it never are the same.
+fn noise(samples: u32) -> u32 {
+    let noise = 2.0 * (samples as f32).powf(-0.75);
+    (noise.min(0.99) * 255.0) as u32
 }
 
 impl Field {
@@ -175,6 +195,11 @@ impl Field {
     /// Whether any of its bits is set in `words`.
     pub fn is_set(self, words: &[u32]) -> bool {
         self.bits(words) != 0
+    }
+
+    /// By how many steps the numbers in `a` and `b` differ.
+    fn apart(self, a: &[u32], b: &[u32]) -> u32 {
+        self.bits(a).abs_diff(self.bits(b))
     }
 
     fn bits(self, words: &[u32]) -> u32 {
@@ -245,6 +270,9 @@ mod tests {
         let differ = |a: [u32; 1], b: [u32; 1]| {
             let mut differ = [0];
             layout.differ(&a, &b, &mut differ);
+            assert_eq!(layout.agree(&a, &b), differ[0] == 0);
+            // An edge lies between other bits, and between shares that ask anew.
+            assert_eq!(layout.has_edge(&a, &b), differ[0] & !0x0100 != 0);
             differ[0]
         };
         assert_eq!(differ(sample(0.0, 0.5), sample(0.0, 0.7)), 0);
@@ -252,7 +280,7 @@ mod tests {
         assert_eq!(differ(sample(1.0, 0.4), sample(1.0, 0.7)), 0x0100);
         assert_eq!(differ(sample(1.0, 0.2), sample(1.0, 0.8)), 0xff00);
         assert_eq!(differ(sample(0.0, 0.0), sample(1.0, 1.0)), 0xff01);
-        assert!(noise(2) < 1.0);
+        assert!(noise(2) < 255);
     }
 
     #[test]
