@@ -73,6 +73,11 @@ pub trait CastCentres: CastRays {
         let _ = ask;
     }
 
+    /// Sets in `ask` all bits of the shares about which it asks anything: once answered, nothing is left to be asked.
+    fn settle(&self, ask: &mut [u32]) {
+        let _ = ask;
+    }
+
     /// Sets the shares in `lit` to the mean of those that are `known`, each with its weight.
     fn blend<'a>(&self, known: impl Iterator<Item = (&'a [u32], f32)> + Clone, lit: &mut [u32]) {
         let _ = (known, lit);
@@ -136,6 +141,12 @@ impl Centring {
         // Without lights there are no words, but a chunk's length may not be zero.
         self.ask.resize((old.object.len() * words).max(old.height()), 0);
         let sources = &self.sources;
+        // Shares are confirmed at every other pixel: a frame later, those of its neighbours are interpolated from it.
+        let spare = |(x, y): (usize, usize), ask: &mut [u32]| {
+            if trust == Trust::Neighbours && (x + y) % 2 == 0 {
+                rays.keep_edges(ask);
+            }
+        };
         let rows = new.rows_mut().zip(self.ask.par_chunks_mut((width * words).max(1)));
         rows.enumerate().for_each(|(y, (mut row, ask))| {
             ask.fill(0);
@@ -165,6 +176,7 @@ impl Centring {
                             reuse(source, &sample);
                             if moved && !same {
                                 carry((old, source), view, (x, y), &sample, rays, (row.lit_mut(x), ask));
+                                spare((x, y), ask);
                             }
                         }
                         None => row.class[x] = PixelClass::Edge,
@@ -195,6 +207,7 @@ impl Centring {
                         if rays.has_shares() {
                             rays.soften(ask);
                             carry((old, i), view, (x, y), &sample, rays, (row.lit_mut(x), ask));
+                            spare((x, y), ask);
                         }
                     }
                 }
@@ -263,6 +276,7 @@ impl Centring {
                 }
                 if ask.iter().any(|&bits| bits != 0) {
                     rays.recast(&row.sample(x), ask, row.lit_mut(x), &mut counts);
+                    rays.settle(ask);
                 }
                 if settled {
                     ask.fill(u32::MAX);

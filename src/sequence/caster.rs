@@ -100,6 +100,10 @@ impl CastCentres for Caster<'_> {
         self.tracer.keep_edges(ask);
     }
 
+    fn settle(&self, ask: &mut [u32]) {
+        self.tracer.settle(ask);
+    }
+
     fn blend<'a>(&self, known: impl Iterator<Item = (&'a [u32], f32)> + Clone, lit: &mut [u32]) {
         self.tracer.blend(known, lit);
     }

@@ -169,6 +169,11 @@ impl<'a> Tracer<'a> {
         self.layout.keep_edges(ask);
     }
 
+    /// Sets all bits of the shares about which `ask` asks anything: once answered, nothing is left to be asked.
+    pub fn settle(&self, ask: &mut [u32]) {
+        self.layout.settle(ask);
+    }
+
     /// Sets the shares in `lit` to the weighted mean of those that are `known`; single bits stay.
     pub fn blend<'b>(&self, known: impl Iterator<Item = (&'b [u32], f32)> + Clone, lit: &mut [u32]) {
         self.layout.blend(known, lit);

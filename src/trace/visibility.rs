@@ -14,8 +14,12 @@ pub(super) struct Layout {
     pub ambient: Option<Field>,
     /// Words of a sample.
     pub words: usize,
-    /// The fields that hold shares, the world's last, and by how many of 255 steps two of them may differ and mean the same.
-    shares: Vec<(Field, u32)>,
+    /// The fields that hold shares.
+    shares: Vec<Field>,
+    /// For each byte, by how many steps two shares there may differ and mean the same; any number where there is none.
+    noise: Vec<[u8; 4]>,
+    /// And by how many they may on one side of the edge of a shadow.
+    edge: Vec<[u8; 4]>,
     /// For each word, the bits that are none of a share's.
     single_bits: Vec<u32>,
     /// For each word, those and the lowest bit of each share: what asks to confirm shares, and for all else.
@@ -34,7 +38,7 @@ pub(super) enum Inquiry {
 }
 
 /// Shares that are farther apart, in 255 steps, are on two sides of an edge, and say nothing about what is between them.
-const EDGE: u32 = 127;
+const EDGE: u8 = 127;
 
 /// One light's bits, all in one word.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
@@ -59,20 +63,28 @@ impl Layout {
         }
         let has_ambient = options.ambient_samples > 0 && scene.world.color != Vec3::ZERO;
         let ambient = has_ambient.then(|| Field::at(&mut bits, 8));
-        let mut shares: Vec<(Field, u32)> = Vec::new();
-        let soft = lights.iter().filter(|field| field.whole > 1);
-        shares.extend(soft.map(|&field| (field, noise(options.light_samples))));
-        shares.extend(ambient.map(|field| (field, noise(options.ambient_samples))));
         let words = bits.div_ceil(32);
+        let (mut noise, mut edge) = (vec![[u8::MAX; 4]; words], vec![[u8::MAX; 4]; words]);
+        let mut shares = Vec::new();
+        let mut add = |field: Field, rays| {
+            noise[field.word][field.shift / 8] = noise_of(rays);
+            // The world throws no shadow.
+            if ambient != Some(field) {
+                edge[field.word][field.shift / 8] = noise_of(rays).max(EDGE);
+            }
+            shares.push(field);
+        };
+        lights.iter().filter(|field| field.is_share()).for_each(|&field| add(field, options.light_samples));
+        ambient.iter().for_each(|&field| add(field, options.ambient_samples));
         let mut single_bits = vec![u32::MAX; words];
-        for (field, _) in &shares {
+        for field in &shares {
             single_bits[field.word] &= !(field.whole << field.shift);
         }
         let mut confirming = single_bits.clone();
-        for (field, _) in &shares {
+        for field in &shares {
             confirming[field.word] |= 1 << field.shift;
         }
-        Self { lights, ambient, words, shares, single_bits, confirming }
+        Self { lights, ambient, words, shares, noise, edge, single_bits, confirming }
     }
 
     /// Whether any light has a share.
@@ -92,9 +104,18 @@ impl Layout {
 
     /// Clears in `ask` what asks to confirm shares, and for the world's: it changes from face to face, but throws no shadow.
     pub fn keep_edges(&self, ask: &mut [u32]) {
-        for &(field, _) in &self.shares {
+        for &field in &self.shares {
             if self.ambient == Some(field) || field.inquiry(ask, ask) != Some(Inquiry::Anew) {
                 ask[field.word] &= !(field.whole << field.shift);
+            }
+        }
+    }
+
+    /// Sets all bits of the shares of which any is set in `ask`.
+    pub fn settle(&self, ask: &mut [u32]) {
+        for field in &self.shares {
+            if field.is_set(ask) {
+                ask[field.word] |= field.whole << field.shift;
             }
         }
     }
@@ -116,40 +137,48 @@ impl Layout {
     /// Sets in `differ` bits of the fields in which `a` and `b` do not mean the same: the lowest bit of shares that might
     /// both be right, all bits of shares on two sides of an edge.
     pub fn differ(&self, a: &[u32], b: &[u32], differ: &mut [u32]) {
-        for (((differ, a), b), single) in differ.iter_mut().zip(a).zip(b).zip(&self.single_bits) {
-            *differ |= (a ^ b) & single;
-        }
-        for &(field, noise) in &self.shares {
-            let apart = field.apart(a, b);
-            if apart > noise {
-                let bits = if apart > noise.max(EDGE) { field.whole } else { 1 };
-                differ[field.word] |= bits << field.shift;
-            }
+        let words = self.single_bits.iter().zip(&self.noise);
+        for (((differ, a), b), (single, noise)) in differ.iter_mut().zip(a).zip(b).zip(words) {
+            let apart = apart(*a, *b);
+            let bits: [u8; 4] = std::array::from_fn(|i| match apart[i] {
+                apart if apart <= noise[i] => 0,
+                apart if apart <= EDGE => 1,
+                _ => u8::MAX,
+            });
+            *differ |= (a ^ b) & single | u32::from_le_bytes(bits) & !single;
         }
     }
 
     /// True if `a` and `b` mean the same in all fields.
     pub fn agree(&self, a: &[u32], b: &[u32]) -> bool {
-        self.is_single_alike(a, b) && self.shares.iter().all(|&(field, noise)| field.apart(a, b) <= noise)
+        self.are_within(&self.noise, a, b)
     }
 
     /// True if `a` and `b` may be on two sides of the edge of a light's shadow.
     pub fn has_edge(&self, a: &[u32], b: &[u32]) -> bool {
-        let lights = &self.shares[..self.shares.len() - usize::from(self.ambient.is_some())];
-        let is_edge = |&(field, noise): &(Field, u32)| field.apart(a, b) > noise.max(EDGE);
-        !self.is_single_alike(a, b) || lights.iter().any(is_edge)
+        !self.are_within(&self.edge, a, b)
     }
 
-    fn is_single_alike(&self, a: &[u32], b: &[u32]) -> bool {
-        a.iter().zip(b).zip(&self.single_bits).all(|((a, b), single)| (a ^ b) & single == 0)
+    /// True if all single bits are the same, and all shares no farther apart than `most` steps.
+    fn are_within(&self, most: &[[u8; 4]], a: &[u32], b: &[u32]) -> bool {
+        let mut words = a.iter().zip(b).zip(self.single_bits.iter().zip(most));
+        words.all(|((&a, &b), (single, most))| {
+            (a ^ b) & single == 0 && apart(a, b).iter().zip(most).all(|(apart, most)| apart <= most)
+        })
     }
 }
 
 /// What two shares from so many rays may differ by though they are of the same truth, in 255 steps: some three standard
 /// deviations where an edge crosses the light. None and all of it never are the same.
-fn noise(samples: u32) -> u32 {
+fn noise_of(samples: u32) -> u8 {
     let noise = 2.0 * (samples as f32).powf(-0.75);
-    (noise.min(0.99) * 255.0) as u32
+    (noise.min(0.99) * 255.0) as u8
+}
+
+/// By how many steps the shares in two words differ, byte by byte.
+fn apart(a: u32, b: u32) -> [u8; 4] {
+    let (a, b) = (a.to_le_bytes(), b.to_le_bytes());
+    std::array::from_fn(|i| a[i].abs_diff(b[i]))
 }
 
 impl Field {
@@ -195,11 +224,6 @@ impl Field {
     /// Whether any of its bits is set in `words`.
     pub fn is_set(self, words: &[u32]) -> bool {
         self.bits(words) != 0
-    }
-
-    /// By how many steps the numbers in `a` and `b` differ.
-    fn apart(self, a: &[u32], b: &[u32]) -> u32 {
-        self.bits(a).abs_diff(self.bits(b))
     }
 
     fn bits(self, words: &[u32]) -> u32 {
@@ -280,7 +304,7 @@ mod tests {
         assert_eq!(differ(sample(1.0, 0.4), sample(1.0, 0.7)), 0x0100);
         assert_eq!(differ(sample(1.0, 0.2), sample(1.0, 0.8)), 0xff00);
         assert_eq!(differ(sample(0.0, 0.0), sample(1.0, 1.0)), 0xff01);
-        assert!(noise(2) < 255);
+        assert!(noise_of(2) < u8::MAX);
     }
 
     #[test]
@@ -304,6 +328,8 @@ mod tests {
         assert_eq!(inquiries(ask[0]), [anew, anew, None]);
         layout.soften(&mut ask);
         assert_eq!(inquiries(ask[0]), [anew, confirm, None]);
+        layout.settle(&mut ask);
+        assert_eq!(inquiries(ask[0]), [anew, anew, None]);
     }
 
     #[test]
