@@ -46,6 +46,16 @@ pub trait CastCentres: CastRays {
         }
     }
 
+    /// True if two samples' shadow bits mean the same: [`CastCentres::differ`] would set none.
+    fn agree(&self, a: &[u32], b: &[u32]) -> bool {
+        a == b
+    }
+
+    /// True if an edge of a shadow may lie between two samples.
+    fn has_edge(&self, a: &[u32], b: &[u32]) -> bool {
+        a != b
+    }
+
     /// Whether any of a sample's bits are numbers: shares of light.
     fn has_shares(&self) -> bool {
         false
@@ -63,6 +73,11 @@ pub trait CastCentres: CastRays {
 
     /// Clears in `ask` what asks for shares only to be confirmed: there is no edge of a shadow.
     fn keep_edges(&self, ask: &mut [u32]) {
+        let _ = ask;
+    }
+
+    /// Sets in `ask` all bits of the shares about which it asks anything: once answered, nothing is left to be asked.
+    fn settle(&self, ask: &mut [u32]) {
         let _ = ask;
     }
 
@@ -130,11 +145,17 @@ impl Centring {
         // Without lights there are no words, but a chunk's length may not be zero.
         self.ask.resize((old.object.len() * words).max(old.height()), 0);
         let sources = &self.sources;
+        // Shares are confirmed at every other pixel: a frame later, those of its neighbours are interpolated from it.
+        let spare = |(x, y): (usize, usize), ask: &mut [u32]| {
+            if trust == Trust::Neighbours && (x + y) % 2 == 0 {
+                rays.keep_edges(ask);
+            }
+        };
         let rows = new.rows_mut().zip(self.ask.par_chunks_mut((width * words).max(1)));
         rows.enumerate().for_each(|(y, (mut row, ask))| {
             ask.fill(0);
             let mut memory = R::Memory::default();
-            for (x, alike) in sources.alike(old, y).enumerate() {
+            for (x, alike) in sources.alike(old, y, rays).enumerate() {
                 let (pixel, ask) = (y * width + x, &mut ask[x * words..][..words]);
                 let own = sources.of(pixel);
                 row.object[x] = UNKNOWN;
@@ -150,13 +171,19 @@ impl Centring {
                 if sources.is_suspect(pixel) {
                     continue;
                 }
-                // Within a triangle that is lit the same all around there is no more to find out.
-                if let Some(Alike { source, moved }) = alike {
+                // Within a triangle that is lit alike all around there is no more to find out.
+                if let Some(Alike { source, moved, same }) = alike {
                     let sample = old.sample(source);
                     let mut centre = || rays.nearest_of(x, y, std::iter::once(sample), &mut memory);
                     let centred = if moved { centre() } else { Some(sample) };
                     match centred {
-                        Some(sample) => reuse(source, &sample),
+                        Some(sample) => {
+                            reuse(source, &sample);
+                            if moved && !same {
+                                carry((old, source), view, (x, y), &sample, rays, (row.lit_mut(x), ask));
+                                spare((x, y), ask);
+                            }
+                        }
                         None => row.class[x] = PixelClass::Edge,
                     }
                     continue;
@@ -186,6 +213,7 @@ impl Centring {
                         if rays.has_shares() {
                             rays.soften(ask);
                             carry((old, i), view, (x, y), &sample, rays, (row.lit_mut(x), ask));
+                            spare((x, y), ask);
                         }
                     }
                 }
@@ -254,6 +282,7 @@ impl Centring {
                 }
                 if ask.iter().any(|&bits| bits != 0) {
                     rays.recast(&row.sample(x), ask, row.lit_mut(x), &mut counts);
+                    rays.settle(ask);
                 }
                 if settled {
                     ask.fill(u32::MAX);

@@ -48,7 +48,7 @@ impl ShadowEdges {
             *found = 0;
             let wonders = |pixel: &usize| {
                 let asked = &asked[pixel * words..][..words];
-                asked.iter().any(|&bits| bits != u32::MAX) && differs_around(buffer, *pixel)
+                asked.iter().any(|&bits| bits != u32::MAX) && differs_around(buffer, *pixel, rays)
             };
             for first in (0..width).step_by(STRETCH) {
                 let stretch = y * width + first..y * width + (first + STRETCH).min(width);
@@ -99,7 +99,9 @@ impl ShadowEdges {
             lit.copy_from_slice(buffer.lit(i));
             let sample = buffer.sample(i);
             for other in pixels_around(buffer.width(), buffer.height(), i) {
-                if buffer.lit(other) != lit && is_one_surface(&sample, &buffer.sample(other), view) {
+                if rays.has_edge(lit, buffer.lit(other))
+                    && is_one_surface(&sample, &buffer.sample(other), view)
+                {
                     rays.differ(lit, buffer.lit(other), ask);
                 }
             }
@@ -150,9 +152,17 @@ fn is_even(buffer: &BuzzBuffer, stretch: &Range<usize>) -> bool {
     }
 }
 
-/// True where the shadow bits of a pixel differ from those of one around it.
-fn differs_around(buffer: &BuzzBuffer, pixel: usize) -> bool {
-    let (width, height) = (buffer.width(), buffer.height());
-    let own = buffer.lit(pixel);
-    pixels_around(width, height, pixel).any(|other| buffer.lit(other) != own)
+/// True where an edge of a shadow may lie between a pixel and one around it.
+fn differs_around(buffer: &BuzzBuffer, pixel: usize, rays: &impl CastCentres) -> bool {
+    let (width, height, words) = (buffer.width(), buffer.height(), buffer.lit_words());
+    let (x, y, own) = (pixel % width, pixel / width, buffer.lit(pixel));
+    if x == 0 || y == 0 || x + 1 == width || y + 1 == height {
+        return pixels_around(width, height, pixel).any(|other| rays.has_edge(own, buffer.lit(other)));
+    }
+    // Nearly every pixel ends here, so three to a row.
+    let differs = |middle: usize| {
+        let three = &buffer.lit[(middle - 1) * words..(middle + 2) * words];
+        three.chunks_exact(words).any(|bits| !bits.iter().eq(own) && rays.has_edge(own, bits))
+    };
+    [pixel - width, pixel, pixel + width].into_iter().any(differs)
 }

@@ -31,17 +31,24 @@ pub(super) fn carry(
     // In old pixels. Between two frames an image hardly turns or grows, so a step is as long in both.
     let column = (i % width) as f32 + x as f32 + 0.5 - landed.x;
     let row = (i / width) as f32 + y as f32 + 0.5 - landed.y;
+    let (left, top) = (column.floor(), row.floor());
+    let weights = |offset: f32| [1.0 - offset, offset];
+    let (columns, rows) = (weights(column - left), weights(row - top));
     let tangent = Tangent::new(*sample, view);
     let corners: [(usize, f32); 4] = std::array::from_fn(|step| {
-        let (left, top) = (column.floor() + (step % 2) as f32, row.floor() + (step / 2) as f32);
-        if left < 0.0 || top < 0.0 || left >= width as f32 || top >= height as f32 {
+        let (right, down) = (step % 2, step / 2);
+        let (x, y) = (left as isize + right as isize, top as isize + down as isize);
+        if x < 0 || y < 0 || x >= width as isize || y >= height as isize {
             return (i, 0.0);
         }
-        let pixel = top as usize * width + left as usize;
-        let weight = (1.0 - (column - left).abs()) * (1.0 - (row - top).abs());
+        let pixel = y as usize * width + x as usize;
+        let weight = columns[right] * rows[down];
         // The bars of a window and the panes behind them are two things, though they are within a pixel's width.
         let is_same_thing = old.surface[pixel].instance == sample.surface.instance;
-        (pixel, if is_same_thing && tangent.may_lend(&old.sample(pixel)) { weight } else { 0.0 })
+        let is_same_face =
+            old.surface[pixel].primitive == sample.surface.primitive && old.normal[pixel] == sample.normal;
+        let lends = is_same_thing && (is_same_face || tangent.may_lend(&old.sample(pixel)));
+        (pixel, if lends { weight } else { 0.0 })
     });
     let mut known = corners.iter().filter(|&&(_, weight)| weight > 0.0);
     rays.blend(known.clone().map(|&(pixel, weight)| (old.lit(pixel), weight)), lit);

@@ -2,6 +2,7 @@
 
 use super::Marks;
 use super::buzz_buffer::BuzzBuffer;
+use super::centre::CastCentres;
 use super::project::Landings;
 use crate::frame::PixelClass;
 use rayon::prelude::*;
@@ -51,24 +52,29 @@ impl Sources {
     }
 
     /// The 3x3 around each pixel of row `y`, one after the other.
-    pub fn alike<'a>(&'a self, old: &'a BuzzBuffer, y: usize) -> impl Iterator<Item = Option<Alike>> + 'a {
-        let (mut left, mut middle) = (None, self.column(old, 0, y));
+    pub fn alike<'a>(
+        &'a self,
+        old: &'a BuzzBuffer,
+        y: usize,
+        rays: &'a impl CastCentres,
+    ) -> impl Iterator<Item = Option<Alike>> + 'a {
+        let (mut left, mut middle) = (None, self.column(old, (0, y), rays));
         (0..old.width()).map(move |x| {
-            let right = self.column(old, x + 1, y);
-            let alike = Alike::across(old, [left, middle, right]);
+            let right = self.column(old, (x + 1, y), rays);
+            let alike = Alike::across(old, [left, middle, right], rays);
             (left, middle) = (middle, right);
             alike
         })
     }
 
     /// The pixel (x, y) and those above and below it, if they are alike.
-    fn column(&self, old: &BuzzBuffer, x: usize, y: usize) -> Option<Alike> {
+    fn column(&self, old: &BuzzBuffer, (x, y): (usize, usize), rays: &impl CastCentres) -> Option<Alike> {
         if x >= old.width() || y == 0 || y + 1 >= old.height() {
             return None;
         }
         let middle = y * old.width() + x;
         let at = |pixel: usize| Alike::of(self.0[pixel]);
-        Alike::across(old, [at(middle - old.width()), at(middle), at(middle + old.width())])
+        Alike::across(old, [at(middle - old.width()), at(middle), at(middle + old.width())], rays)
     }
 
     /// True if something unknown may stand in front here.
@@ -77,7 +83,7 @@ impl Sources {
     }
 }
 
-/// What landed on pixels beside one another if that is one triangle, lit the same on all, and nothing unknown may stand in
+/// What landed on pixels beside one another if that is one triangle, lit alike on all, and nothing unknown may stand in
 /// front.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Alike {
@@ -85,19 +91,28 @@ pub(super) struct Alike {
     pub source: usize,
     /// True if any landed away from its pixel's centre.
     pub moved: bool,
+    /// True if all have the same shadow bits; else they have shares that differ by their noise.
+    pub same: bool,
 }
 
 impl Alike {
     fn of(source: u32) -> Option<Self> {
         let known = source & SUSPECT == 0 && source != NOTHING;
-        known.then_some(Self { source: (source & NOTHING) as usize, moved: source & MOVED != 0 })
+        known.then_some(Self { source: (source & NOTHING) as usize, moved: source & MOVED != 0, same: true })
     }
 
     /// The middle of three for all of them.
-    fn across(old: &BuzzBuffer, three: [Option<Self>; 3]) -> Option<Self> {
+    fn across(old: &BuzzBuffer, three: [Option<Self>; 3], rays: &impl CastCentres) -> Option<Self> {
         let [Some(a), Some(b), Some(c)] = three else { return None };
-        let is_like = |other| old.is_same_primitive(b.source, other) && old.is_lit_alike(b.source, other);
-        let alike = is_like(a.source) && is_like(c.source);
-        alike.then_some(Self { source: b.source, moved: a.moved || b.moved || c.moved })
+        let is_same = |other| old.is_lit_alike(b.source, other);
+        let same = is_same(a.source) && is_same(c.source);
+        let agrees = |other| rays.agree(old.lit(b.source), old.lit(other));
+        let is_one = |other| old.is_same_primitive(b.source, other);
+        let alike = is_one(a.source) && is_one(c.source) && (same || agrees(a.source) && agrees(c.source));
+        alike.then_some(Self {
+            source: b.source,
+            moved: a.moved || b.moved || c.moved,
+            same: same && a.same && b.same && c.same,
+        })
     }
 }

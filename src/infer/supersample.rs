@@ -232,21 +232,12 @@ fn differ<'a>(
     samples.any(|(sample, lit)| {
         !is_one_surface(&first, &sample, view)
             || !is_facing_alike(&first, &sample)
-            || !is_lit_alike(first_lit, lit, rays)
+            || !rays.agree(first_lit, lit)
     })
 }
 
 fn is_facing_alike(a: &SurfaceSample, b: &SurfaceSample) -> bool {
     a.surface.is_background() || a.normal.get().dot(b.normal.get()) > SAME_FACING
-}
-
-fn is_lit_alike(a: &[u32], b: &[u32], rays: &impl CastCentres) -> bool {
-    if a == b {
-        return true;
-    }
-    let mut differ = vec![0; a.len()];
-    rays.differ(a, b, &mut differ);
-    differ.iter().all(|&bits| bits == 0)
 }
 
 /// The samples of the frame that is inferred from.

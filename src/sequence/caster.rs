@@ -79,6 +79,14 @@ impl CastCentres for Caster<'_> {
         self.tracer.differ(a, b, differ);
     }
 
+    fn agree(&self, a: &[u32], b: &[u32]) -> bool {
+        self.tracer.agree(a, b)
+    }
+
+    fn has_edge(&self, a: &[u32], b: &[u32]) -> bool {
+        self.tracer.has_edge(a, b)
+    }
+
     fn has_shares(&self) -> bool {
         self.tracer.has_shares()
     }
@@ -93,6 +101,10 @@ impl CastCentres for Caster<'_> {
 
     fn keep_edges(&self, ask: &mut [u32]) {
         self.tracer.keep_edges(ask);
+    }
+
+    fn settle(&self, ask: &mut [u32]) {
+        self.tracer.settle(ask);
     }
 
     fn blend<'a>(&self, known: impl Iterator<Item = (&'a [u32], f32)> + Clone, lit: &mut [u32]) {

@@ -160,6 +160,16 @@ impl<'a> Tracer<'a> {
         self.layout.differ(a, b, differ);
     }
 
+    /// True if [`Tracer::differ`] sets no bit.
+    pub fn agree(&self, a: &[u32], b: &[u32]) -> bool {
+        self.layout.agree(a, b)
+    }
+
+    /// True if an edge of a light's shadow may lie between two samples. The world throws none.
+    pub fn has_edge(&self, a: &[u32], b: &[u32]) -> bool {
+        self.layout.has_edge(a, b)
+    }
+
     /// Whether samples have shares of any light, not only bits.
     pub fn has_shares(&self) -> bool {
         self.layout.has_shares()
@@ -178,6 +188,11 @@ impl<'a> Tracer<'a> {
     /// Clears in `ask` the bits by which shares are only to be confirmed.
     pub fn keep_edges(&self, ask: &mut [u32]) {
         self.layout.keep_edges(ask);
+    }
+
+    /// Sets all bits of the shares about which `ask` asks anything: once answered, nothing is left to be asked.
+    pub fn settle(&self, ask: &mut [u32]) {
+        self.layout.settle(ask);
     }
 
     /// Sets the shares in `lit` to the weighted mean of those that are `known`; single bits stay.

@@ -3,7 +3,7 @@
 
 use super::TraceOptions;
 use crate::scene::Scene;
-use glam::Vec3;
+use glam::{U8Vec4, Vec3, Vec4};
 
 /// Where in the words of every sample each light is found.
 #[derive(Debug, Clone)]
@@ -14,8 +14,12 @@ pub(super) struct Layout {
     pub ambient: Option<Field>,
     /// Words of a sample.
     pub words: usize,
-    /// The fields that hold shares, and by how much two of them may differ and mean the same.
-    shares: Vec<(Field, f32)>,
+    /// The fields that hold shares.
+    shares: Vec<Field>,
+    /// For each byte, by how many steps two shares there may differ and mean the same; any number where there is none.
+    noise: Vec<[u8; 4]>,
+    /// And by how many they may on one side of the edge of a shadow.
+    edge: Vec<[u8; 4]>,
     /// For each word, the bits that are none of a share's.
     single_bits: Vec<u32>,
     /// For each word, those and the lowest bit of each share: what asks to confirm shares, and for all else.
@@ -33,8 +37,8 @@ pub(super) enum Inquiry {
     Confirm(f32),
 }
 
-/// Shares that are farther apart are on two sides of an edge, and say nothing about what is between them.
-const EDGE: f32 = 0.5;
+/// Shares that are farther apart, in 255 steps, are on two sides of an edge, and say nothing about what is between them.
+const EDGE: u8 = 127;
 
 /// One light's bits, all in one word.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
@@ -59,20 +63,28 @@ impl Layout {
         }
         let has_ambient = options.ambient_samples > 0 && scene.world.color != Vec3::ZERO;
         let ambient = has_ambient.then(|| Field::at(&mut bits, 8));
-        let mut shares: Vec<(Field, f32)> = Vec::new();
-        let soft = lights.iter().filter(|field| field.whole > 1);
-        shares.extend(soft.map(|&field| (field, noise(options.light_samples))));
-        shares.extend(ambient.map(|field| (field, noise(options.ambient_samples))));
         let words = bits.div_ceil(32);
+        let (mut noise, mut edge) = (vec![[u8::MAX; 4]; words], vec![[u8::MAX; 4]; words]);
+        let mut shares = Vec::new();
+        let mut add = |field: Field, rays| {
+            noise[field.word][field.shift / 8] = noise_of(rays);
+            // The world throws no shadow.
+            if ambient != Some(field) {
+                edge[field.word][field.shift / 8] = noise_of(rays).max(EDGE);
+            }
+            shares.push(field);
+        };
+        lights.iter().filter(|field| field.is_share()).for_each(|&field| add(field, options.light_samples));
+        ambient.iter().for_each(|&field| add(field, options.ambient_samples));
         let mut single_bits = vec![u32::MAX; words];
-        for (field, _) in &shares {
+        for field in &shares {
             single_bits[field.word] &= !(field.whole << field.shift);
         }
         let mut confirming = single_bits.clone();
-        for (field, _) in &shares {
+        for field in &shares {
             confirming[field.word] |= 1 << field.shift;
         }
-        Self { lights, ambient, words, shares, single_bits, confirming }
+        Self { lights, ambient, words, shares, noise, edge, single_bits, confirming }
     }
 
     /// Whether any light has a share.
@@ -92,44 +104,81 @@ impl Layout {
 
     /// Clears in `ask` what asks to confirm shares, and for the world's: it changes from face to face, but throws no shadow.
     pub fn keep_edges(&self, ask: &mut [u32]) {
-        for &(field, _) in &self.shares {
+        for &field in &self.shares {
             if self.ambient == Some(field) || field.inquiry(ask, ask) != Some(Inquiry::Anew) {
                 ask[field.word] &= !(field.whole << field.shift);
             }
         }
     }
 
+    /// Sets all bits of the shares of which any is set in `ask`.
+    pub fn settle(&self, ask: &mut [u32]) {
+        for field in &self.shares {
+            if field.is_set(ask) {
+                ask[field.word] |= field.whole << field.shift;
+            }
+        }
+    }
+
     /// Sets the shares in `lit` to the mean of those in `known`, each with its weight. Single bits stay.
     pub fn blend<'a>(&self, known: impl Iterator<Item = (&'a [u32], f32)> + Clone, lit: &mut [u32]) {
-        for &(field, _) in &self.shares {
-            let add = |(sum, all), (words, weight)| (sum + weight * field.share(words), all + weight);
-            let (sum, all) = known.clone().fold((0.0, 0.0), add);
-            if all > 0.0 {
-                field.set(lit, sum / all);
-            }
+        let all: f32 = known.clone().map(|(_, weight)| weight).sum();
+        if all == 0.0 {
+            return;
+        }
+        for (word, (lit, single)) in lit.iter_mut().zip(&self.single_bits).enumerate() {
+            let shares = |words: &[u32]| U8Vec4::from_array(words[word].to_le_bytes()).as_vec4();
+            let sum: Vec4 = known.clone().map(|(words, weight)| shares(words) * weight).sum();
+            let mean = (sum / all + 0.5).as_u8vec4();
+            *lit = *lit & single | u32::from_le_bytes(mean.to_array()) & !single;
         }
     }
 
     /// Sets in `differ` bits of the fields in which `a` and `b` do not mean the same: the lowest bit of shares that might
     /// both be right, all bits of shares on two sides of an edge.
     pub fn differ(&self, a: &[u32], b: &[u32], differ: &mut [u32]) {
-        for (((differ, a), b), single) in differ.iter_mut().zip(a).zip(b).zip(&self.single_bits) {
-            *differ |= (a ^ b) & single;
+        let words = self.single_bits.iter().zip(&self.noise);
+        for (((differ, a), b), (single, noise)) in differ.iter_mut().zip(a).zip(b).zip(words) {
+            let apart = apart(*a, *b);
+            let bits: [u8; 4] = std::array::from_fn(|i| match apart[i] {
+                apart if apart <= noise[i] => 0,
+                apart if apart <= EDGE => 1,
+                _ => u8::MAX,
+            });
+            *differ |= (a ^ b) & single | u32::from_le_bytes(bits) & !single;
         }
-        for (field, noise) in &self.shares {
-            let apart = (field.share(a) - field.share(b)).abs();
-            if apart > *noise {
-                let bits = if apart > noise.max(EDGE) { field.whole } else { 1 };
-                differ[field.word] |= bits << field.shift;
-            }
-        }
+    }
+
+    /// True if `a` and `b` mean the same in all fields.
+    pub fn agree(&self, a: &[u32], b: &[u32]) -> bool {
+        self.are_within(&self.noise, a, b)
+    }
+
+    /// True if `a` and `b` may be on two sides of the edge of a light's shadow.
+    pub fn has_edge(&self, a: &[u32], b: &[u32]) -> bool {
+        !self.are_within(&self.edge, a, b)
+    }
+
+    /// True if all single bits are the same, and all shares no farther apart than `most` steps.
+    fn are_within(&self, most: &[[u8; 4]], a: &[u32], b: &[u32]) -> bool {
+        let mut words = a.iter().zip(b).zip(self.single_bits.iter().zip(most));
+        words.all(|((&a, &b), (single, most))| {
+            (a ^ b) & single == 0 && apart(a, b).iter().zip(most).all(|(apart, most)| apart <= most)
+        })
     }
 }
 
-/// What two shares from so many rays may differ by though they are of the same truth: some three standard deviations
-/// where an edge crosses the light. None and all of it never are the same.
-fn noise(samples: u32) -> f32 {
-    (2.0 * (samples as f32).powf(-0.75)).min(0.99)
+/// What two shares from so many rays may differ by though they are of the same truth, in 255 steps: some three standard
+/// deviations where an edge crosses the light. None and all of it never are the same.
+fn noise_of(samples: u32) -> u8 {
+    let noise = 2.0 * (samples as f32).powf(-0.75);
+    (noise.min(0.99) * 255.0) as u8
+}
+
+/// By how many steps the shares in two words differ, byte by byte.
+fn apart(a: u32, b: u32) -> [u8; 4] {
+    let (a, b) = (a.to_le_bytes(), b.to_le_bytes());
+    std::array::from_fn(|i| a[i].abs_diff(b[i]))
 }
 
 impl Field {
@@ -245,6 +294,9 @@ mod tests {
         let differ = |a: [u32; 1], b: [u32; 1]| {
             let mut differ = [0];
             layout.differ(&a, &b, &mut differ);
+            assert_eq!(layout.agree(&a, &b), differ[0] == 0);
+            // An edge lies between other bits, and between shares that ask anew.
+            assert_eq!(layout.has_edge(&a, &b), differ[0] & !0x0100 != 0);
             differ[0]
         };
         assert_eq!(differ(sample(0.0, 0.5), sample(0.0, 0.7)), 0);
@@ -252,7 +304,7 @@ mod tests {
         assert_eq!(differ(sample(1.0, 0.4), sample(1.0, 0.7)), 0x0100);
         assert_eq!(differ(sample(1.0, 0.2), sample(1.0, 0.8)), 0xff00);
         assert_eq!(differ(sample(0.0, 0.0), sample(1.0, 1.0)), 0xff01);
-        assert!(noise(2) < 1.0);
+        assert!(noise_of(2) < u8::MAX);
     }
 
     #[test]
@@ -276,6 +328,8 @@ mod tests {
         assert_eq!(inquiries(ask[0]), [anew, anew, None]);
         layout.soften(&mut ask);
         assert_eq!(inquiries(ask[0]), [anew, confirm, None]);
+        layout.settle(&mut ask);
+        assert_eq!(inquiries(ask[0]), [anew, anew, None]);
     }
 
     #[test]
