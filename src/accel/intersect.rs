@@ -82,8 +82,12 @@ impl Accel {
         }
         let start = self.bounds.approach(origin, direction);
         let ray = LocalRay { origin: origin + direction * start, direction, t_min: t_min - start };
-        let slabs = SlabRay::new(ray.origin, ray.direction, ray.t_min);
         self.with_pending(|pending| {
+            // Scenes that stand still are one tree: there is nothing to choose from.
+            if let [Placed::Tree(only)] = self.placed.as_slice() {
+                return self.nearest_in(scene, only, &ray, start, sides, &mut nearest, pending);
+            }
+            let slabs = SlabRay::new(ray.origin, ray.direction, ray.t_min);
             self.upper.nearest(&slabs, nearest.hit.t - start, pending, |leaf, _, pending| {
                 for placed in &self.placed[self.upper_leaves[leaf].clone()] {
                     match placed {
@@ -146,8 +150,11 @@ impl Accel {
         }
         let start = self.bounds.approach(from, direction);
         let ray = LocalRay { origin: from + direction * start, direction, t_min: -start };
-        let slabs = SlabRay::new(ray.origin, ray.direction, ray.t_min);
         !self.with_pending(|pending| {
+            if let [Placed::Tree(only)] = self.placed.as_slice() {
+                return self.blocks_in(scene, only, &ray, t_max - start, pending);
+            }
+            let slabs = SlabRay::new(ray.origin, ray.direction, ray.t_min);
             self.upper.any(&slabs, t_max - start, pending, |leaf, pending| {
                 self.placed[self.upper_leaves[leaf].clone()].iter().any(|placed| match placed {
                     Placed::Tree(tree) => self.blocks_in(scene, tree, &ray, t_max - start, pending),

@@ -12,6 +12,7 @@ mod digest;
 mod light;
 mod material;
 mod mesh;
+mod mip;
 mod names;
 mod pose;
 mod requirements;
