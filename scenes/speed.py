@@ -81,7 +81,7 @@ def main() -> None:
     parser.add_argument("--frames", default="20")
     parser.add_argument("--segment", default="12")
     parser.add_argument("--binary", type=Path, default=ROOT / "target/release/buzz-convert")
-    args = parser.parse_args()
+    args = parser.parse_intermixed_args()
     args.out.mkdir(parents=True, exist_ok=True)
     found = []
     for name in args.scenes:

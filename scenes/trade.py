@@ -114,7 +114,7 @@ def main() -> None:
     parser.add_argument("--segment", help="longest segment, as `buzz-convert trade` takes it")
     parser.add_argument("--frames", help="segments to measure, as `buzz-convert trade` takes them")
     parser.add_argument("--binary", type=Path, default=ROOT / "target/release/buzz-convert")
-    args = parser.parse_args()
+    args = parser.parse_intermixed_args()
     measured, chains, spans, noise = [], [], [], []
     for name in args.scenes:
         scene, out = SCENES[name], args.out / name
