@@ -123,7 +123,9 @@ def main() -> None:
             continue
         chosen = {"--segment": args.segment, "--frames": args.frames}
         options = [word for name, value in chosen.items() if value for word in (name, value)]
-        print(run(args.binary, "trade", scene, out, "-r", args.resolution, *options), flush=True)
+        # A run that was stopped goes on where it was.
+        if not (out / "trade.json").exists():
+            print(run(args.binary, "trade", scene, out, "-r", args.resolution, *options), flush=True)
         trade = json.loads((out / "trade.json").read_text())
         flow = baseline(args.binary, scene, out / "full", args.resolution, trade)
         measured += rows(name, trade, flow)
