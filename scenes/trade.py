@@ -116,6 +116,7 @@ def main() -> None:
     parser.add_argument("--binary", type=Path, default=ROOT / "target/release/buzz-convert")
     args = parser.parse_intermixed_args()
     measured, chains, spans, noise = [], [], [], []
+    commit = run("git", "-C", str(ROOT), "rev-parse", "--short", "HEAD").strip()
     for name in args.scenes:
         scene, out = SCENES[name], args.out / name
         if not scene.exists():
@@ -123,21 +124,29 @@ def main() -> None:
             continue
         chosen = {"--segment": args.segment, "--frames": args.frames}
         options = [word for name, value in chosen.items() if value for word in (name, value)]
-        # A run that was stopped goes on where it was.
-        if not (out / "trade.json").exists():
+        # A run that was stopped goes on where it was, if it was the same.
+        same, this = out / "measured.json", json.dumps([commit, args.resolution, *options])
+        if not same.exists() or same.read_text() != this:
             print(run(args.binary, "trade", scene, out, "-r", args.resolution, *options), flush=True)
+            same.write_text(this)
         trade = json.loads((out / "trade.json").read_text())
         flow = baseline(args.binary, scene, out / "full", args.resolution, trade)
         measured += rows(name, trade, flow)
         chains += chain(name, trade)
         spans.append(f"{name} {', '.join(f'{a}-{b}' for a, b in trade['spans'])}")
         noise.append(max(m["summary"]["noise"] for m in trade["qualities"]))
-        write(" ".join(["--resolution", args.resolution, *options]), measured, chains, spans, max(noise))
+        write(commit, " ".join(["--resolution", args.resolution, *options]), measured, chains, spans, max(noise))
 
 
-def write(options: str, measured: list[list[str]], chains: list[list[str]], spans: list[str], noise: float) -> None:
+def write(
+    commit: str,
+    options: str,
+    measured: list[list[str]],
+    chains: list[list[str]],
+    spans: list[str],
+    noise: float,
+) -> None:
     """Writes docs/trade.md as far as it is known: after each scene, so that a run that is stopped leaves something."""
-    commit = run("git", "-C", str(ROOT), "rev-parse", "--short", "HEAD").strip()
     machine = f"{len(os.sched_getaffinity(0))} cores of {processor()}"
     scenes = " ".join(dict.fromkeys(row[0] for row in measured))
     parts = [

@@ -158,9 +158,7 @@ impl ShearedRay {
         let (u, v) = (wb * inverse, wc * inverse);
         PackHits { mask: met.bitmask(), t, u, v, front: sum.cmpgt(zero).bitmask() }
     }
-}
 
-impl ShearedRay {
     /// The hit on one triangle, of which each axis has the coordinates of all corners, with `t_min <= t <= t_max`:
     /// to the last bit that of a pack.
     #[inline]
@@ -188,6 +186,28 @@ impl ShearedRay {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use proptest::prelude::*;
+
+    proptest! {
+        /// A triangle alone is met where it is met in a pack, to the last bit.
+        #[test]
+        fn one_triangle_is_met_as_in_a_pack(
+            corners in prop::array::uniform3(prop::array::uniform3(-1.0..1.0f32)),
+            [u, v] in prop::array::uniform2(-0.2..1.2f32),
+            origin in prop::array::uniform3(-3.0..3.0f32),
+            length in 0.1..4.0f32,
+        ) {
+            let corners = corners.map(Vec3::from);
+            let [a, b, c] = corners;
+            let origin = Vec3::from(origin);
+            // Towards the triangle or past its sides, and at times too short to reach it.
+            let ray = ShearedRay::new(origin, (a + (b - a) * u + (c - a) * v - origin) / length);
+            let axes = [0, 1, 2].map(|axis| Vec4::new(a[axis], b[axis], c[axis], 0.0));
+            let bits = |hit: TriangleHit| ([hit.t, hit.u, hit.v].map(f32::to_bits), hit.front);
+            let alone = ray.meet(&axes, 0.0, 3.0).map(bits);
+            prop_assert_eq!(alone, meet(&ray, corners, 0.0, 3.0).map(bits));
+        }
+    }
 
     const CORNERS: [Vec3; 3] = [Vec3::ZERO, Vec3::X, Vec3::Y];
 

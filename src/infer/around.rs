@@ -38,8 +38,7 @@ impl Nearby {
     const NONE: Self = Self { pixels: [0; Self::MOST + 1], count: 0 };
 
     fn push(&mut self, i: usize) {
-        self.pixels[self.count] = i as u32;
-        self.count += 1;
+        self.push_if(true, i as u32);
     }
 
     /// Without a branch: there is room for one more than may be known.

@@ -24,29 +24,21 @@ impl Shot {
 
     /// An eye; without one, the camera itself.
     pub fn of_eye(eye: Option<StereoEye>, scene: &Scene, settings: &Settings, frame: i64) -> Self {
-        let pose = scene.pose(scene.timing.time_of(frame));
-        let camera = scene.camera_at(frame, settings.camera);
-        let full_view = full_view(eye, scene, settings, (&pose, camera));
-        Self { frame, camera, eye, view: full_view.cropped(settings.window), full_view, pose }
+        Self::posed(eye, scene, settings, frame, Pose::default())
     }
 
     /// Becomes the same of another frame, in the memory that it has.
     pub fn move_to(&mut self, scene: &Scene, settings: &Settings, frame: i64) {
-        scene.pose_into(scene.timing.time_of(frame), &mut self.pose);
-        self.frame = frame;
-        self.camera = scene.camera_at(frame, settings.camera);
-        self.full_view = full_view(self.eye, scene, settings, (&self.pose, self.camera));
-        self.view = self.full_view.cropped(settings.window);
+        let pose = std::mem::take(&mut self.pose);
+        *self = Self::posed(self.eye, scene, settings, frame, pose);
     }
-}
 
-/// The whole image of a camera, or of an eye about it.
-fn full_view(
-    eye: Option<StereoEye>,
-    scene: &Scene,
-    settings: &Settings,
-    (pose, camera): (&Pose, usize),
-) -> View {
-    let middle = scene.view(pose, camera, settings.width, settings.height);
-    settings.stereo.zip(eye).map_or(middle, |(stereo, eye)| middle.of_eye(stereo, eye))
+    /// The shot, in the memory of any pose of the scene.
+    fn posed(eye: Option<StereoEye>, scene: &Scene, settings: &Settings, frame: i64, mut pose: Pose) -> Self {
+        scene.pose_into(scene.timing.time_of(frame), &mut pose);
+        let camera = scene.camera_at(frame, settings.camera);
+        let middle = scene.view(&pose, camera, settings.width, settings.height);
+        let full_view = settings.stereo.zip(eye).map_or(middle, |(stereo, eye)| middle.of_eye(stereo, eye));
+        Self { frame, camera, eye, view: full_view.cropped(settings.window), full_view, pose }
+    }
 }

@@ -1,7 +1,7 @@
 //! A point on a surface: where it is and which way the surface lies, before any texture is asked.
 
 use super::sequence::hash;
-use crate::accel::{Accel, Placement};
+use crate::accel::{Accel, Placement, interpolate};
 use crate::frame::SurfaceRef;
 use crate::scene::{Material, Mesh, Scene};
 use glam::{Vec3, Vec3A};
@@ -111,12 +111,13 @@ impl<'a> SurfacePoint<'a> {
     }
 
     fn place(&mut self, surface: SurfaceRef, side: Side) {
+        let [a, b, c] = self.positions;
+        let mut local = a;
         if self.mesh.shape.is_none() {
             self.weights = [1.0 - surface.u - surface.v, surface.u, surface.v];
+            local = interpolate(a, b, c, surface);
         }
-        let [a, b, c] = self.positions;
-        let [wa, wb, wc] = self.weights;
-        self.position = self.placement.render_from_object.transform_point3a(a * wa + b * wb + c * wc).into();
+        self.position = self.placement.render_from_object.transform_point3a(local).into();
         self.front = side.is_front(self.outward);
         self.geometric = if self.front { self.outward } else { -self.outward };
         self.surface = surface;
