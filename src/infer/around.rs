@@ -1,6 +1,7 @@
 //! What the samples that landed around a pixel say about it: whether they lie on one surface, and which lights reach it.
 
 use super::buzz_buffer::{BuzzBuffer, Projector};
+use super::cell::Cell;
 use super::centre::CastCentres;
 use super::sources::{MOVED, NOTHING, SUSPECT, Sources};
 use crate::frame::SurfaceSample;
@@ -52,10 +53,19 @@ impl Nearby {
     }
 }
 
+/// What shows of one surface around a pixel.
+pub(super) struct Showing {
+    /// Samples that name its triangles, each once.
+    pub triangles: Nearby,
+    /// What was where the centre's point was, if all of it is on the surface.
+    pub cell: Option<Cell>,
+}
+
 /// The samples that landed around a pixel and on it.
 pub(super) struct Around<'a> {
     old: &'a BuzzBuffer,
     view: &'a Projector,
+    pixel: (usize, usize),
     known: Nearby,
     /// Pixels looked at: those outside the image are not.
     size: usize,
@@ -83,7 +93,8 @@ impl<'a> Around<'a> {
                 known.push_if(source & NOTHING != NOTHING, source & NOTHING);
             }
         }
-        Self { old, view, known, size, suspect: flags & SUSPECT != 0, moved: flags & MOVED != 0 }
+        let (suspect, moved) = (flags & SUSPECT != 0, flags & MOVED != 0);
+        Self { old, view, pixel: (x, y), known, size, suspect, moved }
     }
 
     /// Old pixels whose samples are known here.
@@ -101,24 +112,37 @@ impl<'a> Around<'a> {
         !self.moved && !self.suspect && self.is_complete()
     }
 
-    /// Samples that name the triangles of this neighbourhood, each once, that of old sample `i` first; none unless nothing
-    /// unknown may stand in front, and all samples around lie on the surface of `i`.
-    pub fn one_surface(&self, i: usize) -> Option<Nearby> {
-        if self.suspect {
-            return None;
-        }
+    /// What shows here of the surface of old sample `i`: none unless nothing unknown may stand in front, and the pixel's
+    /// centre lies within that surface.
+    pub fn surface_of(&self, i: usize) -> Option<Showing> {
         let mut triangles = Nearby::NONE;
         triangles.push(i);
+        let mut others = Nearby::NONE;
         let tangent = Tangent::new(self.old.sample(i), self.view);
         for k in self.known().filter(|&k| !self.old.is_same_primitive(i, k)) {
             if !tangent.reaches(&self.old.sample(k)) {
-                return None;
-            }
-            if !triangles.iter().any(|named| self.old.is_same_primitive(named, k)) {
+                others.push(k);
+            } else if !triangles.iter().any(|named| self.old.is_same_primitive(named, k)) {
                 triangles.push(k);
             }
         }
-        Some(triangles)
+        let cell = self.cell_on(&tangent, i, i);
+        let showing = Showing { triangles, cell };
+        (others.count == 0 || cell.is_some() && self.is_before(&tangent, i, &others)).then_some(showing)
+    }
+
+    /// The cell that has come to the centre as old sample `k` has, if all of it shows the surface of `i`.
+    fn cell_on(&self, tangent: &Tangent<'_>, i: usize, k: usize) -> Option<Cell> {
+        let is_on = |k: &usize| self.old.is_same_primitive(i, *k) || tangent.reaches(&self.old.sample(*k));
+        Cell::of(self.old, self.view, k, self.pixel).filter(|cell| cell.corners.iter().all(is_on))
+    }
+
+    /// True if no outline of the `others` passes over the surface of `i` here: outlines move with what is nearer, so what
+    /// was at the place that comes here with each of them must be that surface too, unless they are behind it.
+    fn is_before(&self, tangent: &Tangent<'_>, i: usize, others: &Nearby) -> bool {
+        let depth = |k: usize| self.view.depth(&self.old.sample(k));
+        let own = depth(i);
+        others.iter().all(|k| depth(k) > own || self.cell_on(tangent, i, k).is_some())
     }
 
     /// Sets in `ask` the bits of the lights about which the samples around disagree, and clears all others.
@@ -132,6 +156,7 @@ impl<'a> Around<'a> {
 
     /// Takes over into `lit` the bits on which enough samples around that lie on the surface of `sample` agree, and the mean
     /// of their shares. Sets in `ask` those of all other lights. What is not `certain` asks all, and at least to be confirmed.
+    /// True if the bits are those of a whole cell on that surface: it knows better than what only lies around.
     pub fn lend(
         &self,
         sample: &SurfaceSample,
@@ -139,11 +164,21 @@ impl<'a> Around<'a> {
         (trust, certain): (Trust, bool),
         lit: &mut [u32],
         ask: &mut [u32],
-    ) {
+    ) -> bool {
         let tangent = Tangent::new(*sample, self.view);
         let mut lenders = Nearby::NONE;
         self.known().filter(|&k| tangent.may_lend(&self.old.sample(k))).for_each(|k| lenders.push(k));
-        let Some(first) = lenders.iter().next() else { return ask.fill(u32::MAX) };
+        let Some(first) = lenders.iter().next() else {
+            ask.fill(u32::MAX);
+            return false;
+        };
+        if believes_cells(trust, rays)
+            && let Some(cell) = Cell::of(self.old, self.view, first, self.pixel)
+            && cell.corners.iter().all(|&k| tangent.may_lend(&self.old.sample(k)))
+        {
+            cell.lend(self.old, rays, lit, ask);
+            return true;
+        }
         differing(rays, self.old, &lenders, ask);
         lit.copy_from_slice(self.old.lit(first));
         rays.blend(lenders.iter().map(|k| (self.old.lit(k), 1.0)), lit);
@@ -151,7 +186,13 @@ impl<'a> Around<'a> {
         if !certain || lenders.count < enough {
             rays.confirm(ask);
         }
+        false
     }
+}
+
+/// Whether four old pixels that agree about a light are believed. Shares are not bits, and are [carried](super::shares).
+pub(super) fn believes_cells(trust: Trust, rays: &impl CastCentres) -> bool {
+    trust == Trust::Neighbours && !rays.has_shares()
 }
 
 /// Sets the bits of lights on which `samples` do not all agree with the first, and clears all others.

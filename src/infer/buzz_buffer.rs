@@ -366,6 +366,16 @@ impl Projector {
         }
     }
 
+    /// A number that is another in every view, as if by chance.
+    pub(super) fn scatter(&self) -> u64 {
+        let bits = self.raster_from_world.to_cols_array().map(f32::to_bits);
+        // FNV-1a by words, then its well-mixed half.
+        let hash = bits.into_iter().fold(0xcbf2_9ce4_8422_2325_u64, |hash, word| {
+            (hash ^ u64::from(word)).wrapping_mul(0x0100_0000_01b3)
+        });
+        (hash ^ hash >> 29).wrapping_mul(0xbf58_476d_1ce4_e5b9) >> 32
+    }
+
     pub(super) fn raster_from_world(&self) -> &Mat4 {
         &self.raster_from_world
     }

@@ -16,7 +16,7 @@
 //! with the surface ([`carry`]); where they change fast from point to point, a few rays renew them.
 
 use super::Marks;
-use super::around::{Around, Trust, is_one_surface};
+use super::around::{Around, Showing, Trust, believes_cells, is_one_surface};
 use super::buzz_buffer::{BuzzBuffer, CastRays, Projector, Row, UNKNOWN};
 use super::moved::Askers;
 use super::project::Landings;
@@ -103,15 +103,32 @@ pub trait CastCentres: CastRays {
 /// One pixel in so many, on either axis, is proven visible whatever is known about it.
 ///
 /// What was too small to be sampled when it was far away would never be met, however large it grows: nothing lands on it,
-/// and all around it agree that it is not there. Here it is met once it covers this many pixels, and from then on its edges
-/// are cast and it fills its outline, a pixel a frame.
-const LOOKOUT: usize = 8;
+/// and all around it agree that it is not there. Here it is met sooner or later, and from then on its edges are cast and it
+/// fills its outline, a pixel a frame.
+const LOOKOUT: usize = 16;
+
+/// One pixel in so many, on either axis, has its shares confirmed.
+const RENEWED: usize = 8;
 
 /// So many samples must be known in the 3x3 around a pixel before it is filled from them.
 pub(super) const ENOUGH_TO_FILL: usize = 3;
 
-fn is_lookout(x: usize, y: usize) -> bool {
-    x % LOOKOUT == LOOKOUT / 2 && y % LOOKOUT == LOOKOUT / 2
+/// Pixels on a grid that stands elsewhere in each view, so that nothing stays between its points.
+#[derive(Clone, Copy)]
+struct Grid {
+    first: (usize, usize),
+}
+
+impl Grid {
+    fn of(view: &Projector) -> Self {
+        let scattered = view.scatter() as usize;
+        Self { first: (scattered % LOOKOUT, scattered / LOOKOUT % LOOKOUT) }
+    }
+
+    /// True at one pixel in `step` on either axis; a grid of half the step has all pixels of the whole one.
+    fn has(self, (x, y): (usize, usize), step: usize) -> bool {
+        x % step == self.first.0 % step && y % step == self.first.1 % step
+    }
 }
 
 /// What re-centring holds between frames, so that nothing is allocated for each.
@@ -120,6 +137,8 @@ pub struct Centring {
     sources: Sources,
     /// For each pixel: bits of the lights that have to be asked.
     ask: Vec<u32>,
+    /// For each pixel: bits of the lights of which it is in doubt whether what was carried here is right around it.
+    doubt: Vec<u32>,
     shadow_edges: ShadowEdges,
 }
 
@@ -127,7 +146,7 @@ impl Centring {
     /// The most that it holds for each pixel with so many words of shadow bits: a source and the lights to ask, and, where
     /// every pixel is at a shadow's edge, its number three times, the lights to ask and the bits then.
     pub fn bytes_per_pixel(words: usize) -> usize {
-        (1 + words + 3 + 2 * words) * size_of::<u32>()
+        (1 + 2 * words + 3 + 2 * words) * size_of::<u32>()
     }
 
     /// Centres what can be centred without a ray. All other pixels are left unknown; their class says why.
@@ -143,7 +162,9 @@ impl Centring {
         self.sources.settle(landings, marks);
         let (width, words) = (old.width(), old.lit_words());
         // Without lights there are no words, but a chunk's length may not be zero.
-        self.ask.resize((old.object.len() * words).max(old.height()), 0);
+        for bits in [&mut self.ask, &mut self.doubt] {
+            bits.resize((old.object.len() * words).max(old.height()), 0);
+        }
         let sources = &self.sources;
         // Shares are confirmed at every other pixel: a frame later, those of its neighbours are interpolated from it.
         let spare = |(x, y): (usize, usize), ask: &mut [u32]| {
@@ -151,12 +172,15 @@ impl Centring {
                 rays.keep_edges(ask);
             }
         };
-        let rows = new.rows_mut().zip(self.ask.par_chunks_mut((width * words).max(1)));
-        rows.enumerate().for_each(|(y, (mut row, ask))| {
+        let bits = |bits| <[u32]>::par_chunks_mut(bits, (width * words).max(1));
+        let rows = new.rows_mut().zip(bits(&mut self.ask)).zip(bits(&mut self.doubt));
+        rows.enumerate().for_each(|(y, ((mut row, ask), doubt))| {
             ask.fill(0);
+            doubt.fill(if rays.has_shares() { u32::MAX } else { 0 });
             let mut memory = R::Memory::default();
             for (x, alike) in sources.alike(old, y, rays).enumerate() {
-                let (pixel, ask) = (y * width + x, &mut ask[x * words..][..words]);
+                let pixel = y * width + x;
+                let [ask, doubt] = [&mut *ask, &mut *doubt].map(|bits| &mut bits[x * words..][..words]);
                 let own = sources.of(pixel);
                 row.object[x] = UNKNOWN;
                 row.class[x] = match (own, marks.get(pixel)) {
@@ -197,19 +221,25 @@ impl Centring {
                 }
                 let nearby = || around.known().next().filter(|_| around.known().count() >= ENOUGH_TO_FILL);
                 let centred = own.or_else(nearby).and_then(|i| {
-                    let triangles = around.one_surface(i)?;
-                    let sample =
-                        rays.nearest_of(x, y, triangles.iter().map(|k| old.sample(k)), &mut memory)?;
-                    Some((i, sample))
+                    let Showing { triangles, cell } = around.surface_of(i)?;
+                    let candidates = triangles.iter().map(|k| old.sample(k));
+                    let sample = rays.nearest_of(x, y, candidates, &mut memory)?;
+                    Some((i, sample, cell))
                 });
-                if let Some((i, sample)) = centred {
+                if let Some((i, sample, cell)) = centred {
                     reuse(i, &sample);
                     // Where it is the very sample that landed here, its lights are known.
                     if !sources.is_centred(pixel) {
-                        // A hole may hide a shadow's edge: then look farther.
-                        let wide = || Around::new(old, view, sources, (x, y), 2);
-                        let around = if around.is_complete() { around } else { wide() };
-                        around.disagreement(rays, trust, ask);
+                        match cell.filter(|_| believes_cells(trust, rays) && (x + y) % 2 == 0) {
+                            Some(cell) => cell.lend(old, rays, row.lit_mut(x), ask),
+                            None => {
+                                doubt.fill(u32::MAX);
+                                // A hole may hide a shadow's edge: then look farther.
+                                let wide = || Around::new(old, view, sources, (x, y), 2);
+                                let around = if around.is_complete() { around } else { wide() };
+                                around.disagreement(rays, trust, ask);
+                            }
+                        }
                         if rays.has_shares() {
                             rays.soften(ask);
                             carry((old, i), view, (x, y), &sample, rays, (row.lit_mut(x), ask));
@@ -239,15 +269,17 @@ impl Centring {
         let (width, words) = (old.width(), old.lit_words());
         let sources = &self.sources;
         let askers = rays.motion().map(Askers::new);
-        let cast_row = |y: usize, mut row: Row<'_>, ask: &mut [u32]| {
+        let grid = Grid::of(view);
+        let cast_row = |y: usize, mut row: Row<'_>, ask: &mut [u32], doubt: &mut [u32]| {
             let mut counts = RayCounts::default();
             if rays.is_cancelled() {
                 return counts;
             }
             for x in 0..width {
-                let (pixel, ask) = (y * width + x, &mut ask[x * words..][..words]);
+                let pixel = y * width + x;
+                let [ask, doubt] = [&mut *ask, &mut *doubt].map(|bits| &mut bits[x * words..][..words]);
                 let known = row.object[x] != UNKNOWN;
-                let is_lookout = moves && is_lookout(x, y);
+                let is_lookout = moves && grid.has((x, y), LOOKOUT);
                 if known
                     && (is_lookout || trust == Trust::Proof)
                     && rays.is_hidden(&row.sample(x), &mut counts)
@@ -255,7 +287,7 @@ impl Centring {
                     row.class[x] = PixelClass::Bad;
                     row.object[x] = UNKNOWN;
                 }
-                if is_lookout && rays.has_shares() {
+                if moves && rays.has_shares() && grid.has((x, y), RENEWED) {
                     rays.confirm(ask);
                 }
                 if row.object[x] == UNKNOWN {
@@ -265,15 +297,17 @@ impl Centring {
                     ask.fill(u32::MAX);
                     let own = sources.of(pixel);
                     let certain = own.filter(|&i| is_one_surface(&sample, &old.sample(i), view));
-                    if certain.is_some() || rays.has_shares() {
+                    let mut in_cell = false;
+                    if certain.is_some() || rays.has_shares() || trust == Trust::Neighbours {
                         let around = Around::new(old, view, sources, (x, y), 2);
-                        around.lend(&sample, rays, (trust, certain.is_some()), row.lit_mut(x), ask);
+                        in_cell = around.lend(&sample, rays, (trust, certain.is_some()), row.lit_mut(x), ask);
                         if let Some(i) = certain
                             && rays.has_shares()
                         {
                             carry((old, i), view, (x, y), &sample, rays, (row.lit_mut(x), ask));
                         }
                     }
+                    doubt.fill(if in_cell { 0 } else { u32::MAX });
                 }
                 // Its lights were asked when it was cast, or since.
                 let settled = sources.is_centred(pixel) && ask.iter().all(|&bits| bits == 0);
@@ -281,7 +315,18 @@ impl Centring {
                     askers.ask(&row.sample(x), row.lit_mut(x), ask);
                 }
                 if ask.iter().any(|&bits| bits != 0) {
-                    rays.recast(&row.sample(x), ask, row.lit_mut(x), &mut counts);
+                    let (sample, lit) = (row.sample(x), row.lit_mut(x));
+                    let believed = doubt.iter().all(|&bits| bits == 0);
+                    // Where what is found is not what was carried, that is in doubt around here too.
+                    let mut note =
+                        |lit: &[u32]| doubt.iter_mut().zip(lit).for_each(|(doubt, lit)| *doubt ^= lit);
+                    if believed {
+                        note(lit);
+                    }
+                    rays.recast(&sample, ask, lit, &mut counts);
+                    if believed {
+                        note(lit);
+                    }
                     rays.settle(ask);
                 }
                 if settled {
@@ -290,8 +335,12 @@ impl Centring {
             }
             counts
         };
-        let rows = new.rows_mut().zip(self.ask.par_chunks_mut((width * words).max(1)));
-        let counts: RayCounts = rows.enumerate().map(|(y, (row, ask))| cast_row(y, row, ask)).sum();
-        [counts, self.shadow_edges.follow(new, view, &mut self.ask, rays)].into_iter().sum()
+        let bits = |bits| <[u32]>::par_chunks_mut(bits, (width * words).max(1));
+        let rows = new.rows_mut().zip(bits(&mut self.ask)).zip(bits(&mut self.doubt));
+        let rows = rows.enumerate();
+        let counts: RayCounts = rows.map(|(y, ((row, ask), doubt))| cast_row(y, row, ask, doubt)).sum();
+        [counts, self.shadow_edges.follow(new, view, (&mut self.ask, &mut self.doubt), rays)]
+            .into_iter()
+            .sum()
     }
 }

@@ -22,6 +22,7 @@
 
 mod around;
 mod buzz_buffer;
+mod cell;
 mod centre;
 mod creeping;
 mod entering;

@@ -2,8 +2,9 @@
 //!
 //! A shadow too thin to be sampled when it was far away may be several pixels wide by now, with all samples around it
 //! agreeing that there is none. But it is known somewhere: where it is nearer, or was traced. So wherever two neighbours
-//! on one surface disagree about a light, a ray is cast to it from both; where that changes a bit, the pixels around are
-//! looked at again, until the edge has been followed to its end.
+//! on one surface disagree about a light, and it is in doubt whether the bit of either was carried rightly, a ray is cast
+//! to it from both; where that changes a bit, the pixels around are looked at again, until the edge has been followed to
+//! its end.
 
 use super::around::is_one_surface;
 use super::buzz_buffer::{BuzzBuffer, Projector, pixels_around};
@@ -28,12 +29,13 @@ pub(super) struct ShadowEdges {
 
 impl ShadowEdges {
     /// Settles the shadow bits of `buffer`, which is complete. `asked` has the bits of the lights that each pixel has
-    /// asked already; those that it asks here are added.
+    /// asked already; those that it asks here are added. `doubt` has those about which what is around a pixel may be wrong;
+    /// the bits that change here are added.
     pub fn follow(
         &mut self,
         buffer: &mut BuzzBuffer,
         view: &Projector,
-        asked: &mut [u32],
+        (asked, doubt): (&mut [u32], &mut [u32]),
         rays: &impl CastCentres,
     ) -> RayCounts {
         let mut counts = RayCounts::default();
@@ -63,8 +65,8 @@ impl ShadowEdges {
         let rows = self.rows.chunks(width).zip(&self.found);
         rows.for_each(|(row, &found)| self.pixels.extend(&row[..found]));
         while !self.pixels.is_empty() && !rays.is_cancelled() {
-            counts += self.ask(buffer, view, asked, rays);
-            self.apply(buffer, asked);
+            counts += self.ask(buffer, view, (asked, doubt), rays);
+            self.apply(buffer, (asked, doubt));
         }
         counts
     }
@@ -87,7 +89,7 @@ impl ShadowEdges {
         &mut self,
         buffer: &BuzzBuffer,
         view: &Projector,
-        asked: &[u32],
+        (asked, doubt): (&[u32], &[u32]),
         rays: &impl CastCentres,
     ) -> RayCounts {
         let words = buffer.lit_words();
@@ -98,8 +100,17 @@ impl ShadowEdges {
             let i = pixel as usize;
             lit.copy_from_slice(buffer.lit(i));
             let sample = buffer.sample(i);
+            let of = |bits: &'_ [u32], pixel: usize, word: usize| bits[pixel * words + word];
+            let in_doubt = |other: usize| {
+                (0..words).any(|w| {
+                    (of(&buffer.lit, i, w) ^ of(&buffer.lit, other, w))
+                        & (of(doubt, i, w) | of(doubt, other, w))
+                        != 0
+                })
+            };
             for other in pixels_around(buffer.width(), buffer.height(), i) {
-                if rays.has_edge(lit, buffer.lit(other))
+                if in_doubt(other)
+                    && rays.has_edge(lit, buffer.lit(other))
                     && is_one_surface(&sample, &buffer.sample(other), view)
                 {
                     rays.differ(lit, buffer.lit(other), ask);
@@ -116,7 +127,7 @@ impl ShadowEdges {
     }
 
     /// Takes over the answers; where they change a bit, the pixels around are looked at next.
-    fn apply(&mut self, buffer: &mut BuzzBuffer, asked: &mut [u32]) {
+    fn apply(&mut self, buffer: &mut BuzzBuffer, (asked, doubt): (&mut [u32], &mut [u32])) {
         let words = buffer.lit_words();
         self.next.clear();
         let answers = self.ask.chunks(words).zip(self.lit.chunks(words));
@@ -124,6 +135,7 @@ impl ShadowEdges {
             let i = pixel as usize;
             asked[i * words..].iter_mut().zip(ask).for_each(|(asked, ask)| *asked |= ask);
             if buffer.lit(i) != lit {
+                doubt[i * words..][..words].fill(u32::MAX);
                 buffer.lit[i * words..][..words].copy_from_slice(lit);
                 self.next.push(pixel);
                 self.next.extend(pixels_around(buffer.width(), buffer.height(), i).map(|other| other as u32));

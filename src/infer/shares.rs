@@ -7,16 +7,17 @@
 
 use super::around::Tangent;
 use super::buzz_buffer::{BuzzBuffer, Projector};
+use super::cell::place_before;
 use super::centre::CastCentres;
 use crate::frame::SurfaceSample;
 
-/// Interpolates into `lit` the shares of `sample`, at the centre of pixel (x, y), near which the sample of old pixel `i`
+/// Interpolates into `lit` the shares of `sample`, at the centre of `pixel` (x, y), near which the sample of old pixel `i`
 /// landed: between the four old pixels around that point, as far as they lie on its surface. Sets in `ask` bits of those on
 /// which they disagree, and where none lies there, of all.
 pub(super) fn carry(
     (old, i): (&BuzzBuffer, usize),
     view: &Projector,
-    (x, y): (usize, usize),
+    pixel: (usize, usize),
     sample: &SurfaceSample,
     rays: &impl CastCentres,
     (lit, ask): (&mut [u32], &mut [u32]),
@@ -24,13 +25,11 @@ pub(super) fn carry(
     if sample.surface.is_background() {
         return;
     }
-    let Some(landed) = view.project(old.position[i], old.normal[i].direction(), false) else {
+    let Some(place) = place_before(old, view, i, pixel) else {
         return rays.confirm(ask);
     };
     let (width, height) = (old.width(), old.height());
-    // In old pixels. Between two frames an image hardly turns or grows, so a step is as long in both.
-    let column = (i % width) as f32 + x as f32 + 0.5 - landed.x;
-    let row = (i / width) as f32 + y as f32 + 0.5 - landed.y;
+    let [column, row] = place.to_array();
     let (left, top) = (column.floor(), row.floor());
     let weights = |offset: f32| [1.0 - offset, offset];
     let (columns, rows) = (weights(column - left), weights(row - top));
