@@ -22,7 +22,8 @@ use super::moved::Askers;
 use super::project::Landings;
 use super::shadow_edges::ShadowEdges;
 use super::shares::carry;
-use super::sources::{Alike, Sources};
+use super::alike::{Alike, Likeness};
+use super::sources::Sources;
 use crate::frame::{PixelClass, RayCounts, SurfaceSample};
 use rayon::prelude::*;
 
@@ -114,6 +115,15 @@ fn is_lookout(x: usize, y: usize) -> bool {
     x % LOOKOUT == LOOKOUT / 2 && y % LOOKOUT == LOOKOUT / 2
 }
 
+/// The class of a pixel, by what landed on it and by what was found at its centre; else `class`.
+fn class_of<L, C>(landed: Option<L>, centred: Option<C>, class: PixelClass) -> PixelClass {
+    match (landed, centred) {
+        (None, Some(_)) => PixelClass::Filled,
+        (Some(_), None) => PixelClass::Edge,
+        _ => class,
+    }
+}
+
 /// What re-centring holds between frames, so that nothing is allocated for each.
 #[derive(Debug, Default)]
 pub struct Centring {
@@ -124,10 +134,10 @@ pub struct Centring {
 }
 
 impl Centring {
-    /// The most that it holds for each pixel with so many words of shadow bits: a source and the lights to ask, and, where
+    /// The most that it holds for each pixel with so many words of shadow bits: its source, the lights to ask, and, where
     /// every pixel is at a shadow's edge, its number three times, the lights to ask and the bits then.
     pub fn bytes_per_pixel(words: usize) -> usize {
-        (1 + words + 3 + 2 * words) * size_of::<u32>()
+        Sources::bytes_per_pixel(words) + (words + 3 + 2 * words) * size_of::<u32>()
     }
 
     /// Centres what can be centred without a ray. All other pixels are left unknown; their class says why.
@@ -140,11 +150,12 @@ impl Centring {
         trust: Trust,
         new: &mut BuzzBuffer,
     ) {
-        self.sources.settle(landings, marks);
+        self.sources.settle(old, landings, marks);
         let (width, words) = (old.width(), old.lit_words());
         // Without lights there are no words, but a chunk's length may not be zero.
         self.ask.resize((old.object.len() * words).max(old.height()), 0);
         let sources = &self.sources;
+        let likeness = Likeness { old, sources, rays, trust };
         // Shares are confirmed at every other pixel: a frame later, those of its neighbours are interpolated from it.
         let spare = |(x, y): (usize, usize), ask: &mut [u32]| {
             if trust == Trust::Neighbours && (x + y) % 2 == 0 {
@@ -155,7 +166,7 @@ impl Centring {
         rows.enumerate().for_each(|(y, (mut row, ask))| {
             ask.fill(0);
             let mut memory = R::Memory::default();
-            for (x, alike) in sources.alike(old, y, rays).enumerate() {
+            for (x, alike) in likeness.of_row(y).enumerate() {
                 let (pixel, ask) = (y * width + x, &mut ask[x * words..][..words]);
                 let own = sources.of(pixel);
                 row.object[x] = UNKNOWN;
@@ -176,16 +187,14 @@ impl Centring {
                     let sample = old.sample(source);
                     let mut centre = || rays.nearest_of(x, y, std::iter::once(sample), &mut memory);
                     let centred = if moved { centre() } else { Some(sample) };
-                    match centred {
-                        Some(sample) => {
-                            reuse(source, &sample);
-                            if moved && !same {
-                                carry((old, source), view, (x, y), &sample, rays, (row.lit_mut(x), ask));
-                                spare((x, y), ask);
-                            }
+                    if let Some(sample) = centred {
+                        reuse(source, &sample);
+                        if moved && !same {
+                            carry((old, source), view, (x, y), &sample, rays, (row.lit_mut(x), ask));
+                            spare((x, y), ask);
                         }
-                        None => row.class[x] = PixelClass::Edge,
                     }
+                    row.class[x] = class_of(own, centred, row.class[x]);
                     continue;
                 }
                 let around = Around::new(old, view, sources, (x, y), 1);
@@ -217,11 +226,7 @@ impl Centring {
                         }
                     }
                 }
-                row.class[x] = match (own, centred) {
-                    (None, Some(_)) => PixelClass::Filled,
-                    (Some(_), None) => PixelClass::Edge,
-                    _ => row.class[x],
-                };
+                row.class[x] = class_of(own, centred, row.class[x]);
             }
         });
     }
