@@ -7,6 +7,7 @@ use super::around::Trust;
 use super::buzz_buffer::BuzzBuffer;
 use super::centre::{CastCentres, ENOUGH_TO_FILL};
 use super::sources::{MOVED, NAMES, NOTHING, SUSPECT, Sources};
+use crate::frame::SurfaceSample;
 use std::ops::Range;
 
 /// Pixels of a row that are looked at together.
@@ -19,55 +20,94 @@ const REACH: usize = 2;
 /// The columns of a stretch, and those beside it.
 const COLUMNS: usize = STRETCH + 2 * REACH;
 
-/// What landed on a pixel and around it, if that is one triangle, lit alike everywhere, and nothing unknown may stand in
-/// front.
+/// Pixels that are centred together.
+const FOUR: usize = 4;
+
+/// A pixel around which all is alike.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Alike {
     /// The old pixel of the sample that landed here; else of the first around.
     pub source: usize,
-    /// True if any landed away from its pixel's centre, or none.
-    pub moved: bool,
-    /// True if all have the same shadow bits; else they have shares that differ by their noise.
+    /// The sample at the centre; none if that is beside the triangle.
+    pub centre: Option<SurfaceSample>,
+    /// True if all have the same shadow bits, or none has moved; else they have shares that differ by their noise.
     pub same: bool,
 }
 
-/// Finds such pixels in one image.
-#[derive(Debug)]
-pub(super) struct Likeness<'a, R> {
-    pub old: &'a BuzzBuffer,
-    pub sources: &'a Sources,
-    pub rays: &'a R,
-    pub trust: Trust,
+/// Finds the pixels of a row of which all that landed on them and around is one triangle, lit alike everywhere, and before
+/// which nothing unknown may stand.
+pub(super) struct AlikeRow<'a, R> {
+    old: &'a BuzzBuffer,
+    sources: &'a Sources,
+    rays: &'a R,
+    trust: Trust,
+    y: usize,
+    /// Of the stretch and the four that the last pixel is of.
+    stretch: [Option<Found>; STRETCH],
+    four: Option<[Option<SurfaceSample>; FOUR]>,
 }
 
-impl<'a, R: CastCentres> Likeness<'a, R> {
-    /// What is alike around each pixel of row `y`, one after the other.
-    pub fn of_row(&'a self, y: usize) -> impl Iterator<Item = Option<Alike>> + 'a {
-        let width = self.old.width();
-        (0..width).step_by(STRETCH).flat_map(move |first| {
-            let stretch = Stretch::new(self, first, y);
-            (first..(first + STRETCH).min(width)).map(move |x| self.alike(&stretch, (x, y), x - first))
-        })
+/// Such a pixel before it is centred.
+#[derive(Debug, Clone, Copy)]
+struct Found {
+    source: usize,
+    /// True if any landed away from its pixel's centre, or none.
+    moved: bool,
+    same: bool,
+}
+
+impl<'a, R: CastCentres> AlikeRow<'a, R> {
+    /// Row `y` of the image that `sources` make of `old`.
+    pub fn new(old: &'a BuzzBuffer, sources: &'a Sources, rays: &'a R, trust: Trust, y: usize) -> Self {
+        Self { old, sources, rays, trust, y, stretch: [None; STRETCH], four: None }
     }
 
-    fn alike(&self, stretch: &Stretch, (x, y): (usize, usize), at: usize) -> Option<Alike> {
-        if stretch.names[at] != 0 || stretch.flags[at] & SUSPECT != 0 {
+    /// Column `x`. They are asked for in order.
+    pub fn at(&mut self, x: usize, memory: &mut R::Memory) -> Option<Alike> {
+        let at = x % STRETCH;
+        if at == 0 {
+            let said = Stretch::new(self, x);
+            self.stretch = std::array::from_fn(|at| self.found(&said, x, at));
+        }
+        if at % FOUR == 0 {
+            self.four = self.four(x, memory);
+        }
+        let Found { source, moved, same } = self.stretch[at]?;
+        let centre = match self.four {
+            Some(four) => four[at % FOUR],
+            None if moved => self.rays.nearest_of(x, self.y, [self.old.sample(source)].into_iter(), memory),
+            None => Some(self.old.sample(source)),
+        };
+        Some(Alike { source, centre, same: same || !moved })
+    }
+
+    /// The centres of the four pixels from column `x` on, if all are alike and on one triangle.
+    fn four(&self, x: usize, memory: &mut R::Memory) -> Option<[Option<SurfaceSample>; FOUR]> {
+        let at = x % STRETCH;
+        let [Some(a), Some(b), Some(c), Some(d)] = self.stretch[at..at + FOUR] else { return None };
+        let is_one = |other: Found| other.moved && self.old.is_same_primitive(a.source, other.source);
+        let four = [a, b, c, d];
+        let samples = || four.map(|found| self.old.sample(found.source));
+        four.into_iter().all(is_one).then(|| self.rays.four_on((x, self.y), samples(), memory))?
+    }
+
+    fn found(&self, said: &Stretch, first: usize, at: usize) -> Option<Found> {
+        let x = first + at;
+        if x >= self.old.width() || said.names[at] != 0 || said.flags[at] & SUSPECT != 0 {
             return None;
         }
-        let is_complete = stretch.missing[at] == 0;
-        let same = stretch.lit[at] == 0;
-        if is_complete {
-            let source = self.sources.of(y * self.old.width() + x)?;
-            let moved = stretch.flags[at] & MOVED != 0;
-            return (same || self.agree((x, y))).then_some(Alike { source, moved, same });
+        let own = self.sources.of(self.y * self.old.width() + x);
+        let same = said.lit[at] == 0;
+        if said.missing[at] == 0 {
+            let moved = said.flags[at] & MOVED != 0;
+            return own.filter(|_| same || self.agree((x, self.y))).map(|source| Found { source, moved, same });
         }
         // Shares are interpolated where anything is missing.
         let may_fill = self.trust == Trust::Neighbours && !self.rays.has_shares();
-        if !may_fill || stretch.wide_lit[at] != 0 {
+        if !may_fill || said.wide_lit[at] != 0 {
             return None;
         }
-        let source = self.sources.of(y * self.old.width() + x).or_else(|| self.first_around(x, y))?;
-        Some(Alike { source, moved: true, same: true })
+        own.or_else(|| self.first_around(x, self.y)).map(|source| Found { source, moved: true, same: true })
     }
 
     /// The first sample around a pixel on which none landed, if there are enough of them.
@@ -108,8 +148,8 @@ struct Stretch {
 }
 
 impl Stretch {
-    fn new<R>(of: &Likeness<'_, R>, first: usize, y: usize) -> Self {
-        let (width, height) = (of.old.width(), of.old.height());
+    fn new<R>(of: &AlikeRow<'_, R>, first: usize) -> Self {
+        let (width, height, y) = (of.old.width(), of.old.height(), of.y);
         let columns = first.saturating_sub(REACH)..(first + STRETCH + REACH).min(width);
         // Where `columns` begin: outside the image nothing landed.
         let at = columns.start + REACH - first;

@@ -275,6 +275,7 @@ pub struct Projector {
     far: f32,
     width: f32,
     height: f32,
+    columns: usize,
     /// Side of a pixel at planar depth 1, or anywhere in parallel projection.
     pixel: f32,
 }
@@ -302,6 +303,7 @@ impl Projector {
             far: view.lens.far as f32,
             width: view.width as f32,
             height: view.height as f32,
+            columns: view.width as usize,
             pixel: view.pixel_size() as f32,
         }
     }
@@ -348,7 +350,7 @@ impl Projector {
     /// Number of the pixel that holds raster position (x, y), if it is in the window.
     pub fn pixel(&self, x: f32, y: f32) -> Option<usize> {
         let inside = x >= 0.0 && y >= 0.0 && x < self.width && y < self.height;
-        inside.then(|| y as usize * self.width as usize + x as usize)
+        inside.then(|| y as u32 as usize * self.columns + x as u32 as usize)
     }
 
     /// The direction in which a ray of this view passes through `position`; not normalised.

@@ -22,7 +22,7 @@ use super::moved::Askers;
 use super::project::Landings;
 use super::shadow_edges::ShadowEdges;
 use super::shares::carry;
-use super::alike::{Alike, Likeness};
+use super::alike::{Alike, AlikeRow};
 use super::sources::Sources;
 use crate::frame::{PixelClass, RayCounts, SurfaceSample};
 use rayon::prelude::*;
@@ -97,6 +97,18 @@ pub trait CastCentres: CastRays {
         memory: &mut Self::Memory,
     ) -> Option<SurfaceSample>;
 
+    /// What the rays through the centres of four pixels, the first of which is (x, y), each meet of the triangle that the
+    /// sample of its own lies on; it is the same for all. None if they have to be looked at one by one.
+    fn four_on(
+        &self,
+        (x, y): (usize, usize),
+        samples: [SurfaceSample; 4],
+        memory: &mut Self::Memory,
+    ) -> Option<[Option<SurfaceSample>; 4]> {
+        let _ = (x, y, samples, memory);
+        None
+    }
+
     /// True if something hides the sample from the eye. Counted as `visibility`.
     fn is_hidden(&self, sample: &SurfaceSample, counts: &mut RayCounts) -> bool;
 }
@@ -155,7 +167,6 @@ impl Centring {
         // Without lights there are no words, but a chunk's length may not be zero.
         self.ask.resize((old.object.len() * words).max(old.height()), 0);
         let sources = &self.sources;
-        let likeness = Likeness { old, sources, rays, trust };
         // Shares are confirmed at every other pixel: a frame later, those of its neighbours are interpolated from it.
         let spare = |(x, y): (usize, usize), ask: &mut [u32]| {
             if trust == Trust::Neighbours && (x + y) % 2 == 0 {
@@ -166,7 +177,8 @@ impl Centring {
         rows.enumerate().for_each(|(y, (mut row, ask))| {
             ask.fill(0);
             let mut memory = R::Memory::default();
-            for (x, alike) in likeness.of_row(y).enumerate() {
+            let mut alike = AlikeRow::new(old, sources, rays, trust, y);
+            for x in 0..width {
                 let (pixel, ask) = (y * width + x, &mut ask[x * words..][..words]);
                 let own = sources.of(pixel);
                 row.object[x] = UNKNOWN;
@@ -179,22 +191,19 @@ impl Centring {
                     row.put(x, view, sample);
                     row.lit_mut(x).copy_from_slice(old.lit(i));
                 };
-                if sources.is_suspect(pixel) {
-                    continue;
-                }
                 // Within a triangle that is lit alike all around there is no more to find out.
-                if let Some(Alike { source, moved, same }) = alike {
-                    let sample = old.sample(source);
-                    let mut centre = || rays.nearest_of(x, y, std::iter::once(sample), &mut memory);
-                    let centred = if moved { centre() } else { Some(sample) };
-                    if let Some(sample) = centred {
+                if let Some(Alike { source, centre, same }) = alike.at(x, &mut memory) {
+                    if let Some(sample) = centre {
                         reuse(source, &sample);
-                        if moved && !same {
+                        if !same {
                             carry((old, source), view, (x, y), &sample, rays, (row.lit_mut(x), ask));
                             spare((x, y), ask);
                         }
                     }
-                    row.class[x] = class_of(own, centred, row.class[x]);
+                    row.class[x] = class_of(own, centre, row.class[x]);
+                    continue;
+                }
+                if sources.is_suspect(pixel) {
                     continue;
                 }
                 let around = Around::new(old, view, sources, (x, y), 1);

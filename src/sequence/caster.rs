@@ -2,7 +2,7 @@
 
 use super::Observer;
 use super::motion::SceneMotion;
-use crate::accel::KnownTriangle;
+use crate::accel::KnownTriangles;
 use crate::frame::{RayCounts, SurfaceSample};
 use crate::infer::{CastCentres, CastRays, Lattice, Motion};
 use crate::scene::View;
@@ -64,7 +64,7 @@ impl CastRays for Caster<'_> {
 }
 
 impl CastCentres for Caster<'_> {
-    type Memory = KnownTriangle;
+    type Memory = KnownTriangles;
 
     fn hit(&self, x: usize, y: usize, counts: &mut RayCounts) -> SurfaceSample {
         let (x, y) = self.place(x, y);
@@ -116,10 +116,21 @@ impl CastCentres for Caster<'_> {
         x: usize,
         y: usize,
         candidates: impl Iterator<Item = SurfaceSample>,
-        known: &mut KnownTriangle,
+        known: &mut KnownTriangles,
     ) -> Option<SurfaceSample> {
         let (x, y) = self.place(x, y);
         self.tracer.nearest_of(&self.eye, x, y, candidates, known)
+    }
+
+    fn four_on(
+        &self,
+        (x, y): (usize, usize),
+        samples: [SurfaceSample; 4],
+        known: &mut KnownTriangles,
+    ) -> Option<[Option<SurfaceSample>; 4]> {
+        let (_, row) = self.place(x, y);
+        let columns = [x, x + 1, x + 2, x + 3].map(|x| self.place(x, y).0);
+        self.tracer.four_on(&self.eye, (columns, row), samples, known)
     }
 
     fn is_hidden(&self, sample: &SurfaceSample, counts: &mut RayCounts) -> bool {

@@ -24,13 +24,13 @@ mod visibility;
 mod whitted;
 mod world;
 
-use crate::accel::{Accel, KnownTriangle, PreparedRay, Ray, Sides};
+use crate::accel::{Accel, KnownTriangles, PreparedRay, Ray, Sides};
 use crate::frame::{PackedNormal, RayCounts, SurfaceRef, SurfaceSample};
 use crate::scene::{Pose, Scene, View};
 pub use changes::LightChanges;
 use delta_lights::{DeltaLights, is_delta};
 pub use eye::Eye;
-use glam::Vec3;
+use glam::{Vec3, Vec4};
 use interaction::{Beam, SurfaceInteraction};
 use light::Emitter;
 use point::{Side, SurfacePoint};
@@ -209,7 +209,7 @@ impl<'a> Tracer<'a> {
         x: f64,
         y: f64,
         candidates: impl Iterator<Item = SurfaceSample>,
-        known: &mut KnownTriangle,
+        known: &mut KnownTriangles,
     ) -> Option<SurfaceSample> {
         let ray = eye.ray(self.accel, x, y);
         let mut prepared = PreparedRay::new(ray);
@@ -234,6 +234,30 @@ impl<'a> Tracer<'a> {
         let seen = outward.map(|n| PackedNormal::new(if hit.front { n } else { -n }));
         let normal = seen.unwrap_or(candidate.normal);
         Some(SurfaceSample { position, surface: hit.surface, normal, ..candidate })
+    }
+
+    /// What the rays through raster positions (x, y) each meet of the triangle that the sample of its own lies on, which is the
+    /// same for all. None if they have to be looked at one by one, by [`Tracer::nearest_of`].
+    pub fn four_on(
+        &self,
+        eye: &Eye,
+        (x, y): ([f64; 4], f64),
+        samples: [SurfaceSample; 4],
+        known: &mut KnownTriangles,
+    ) -> Option<[Option<SurfaceSample>; 4]> {
+        let surface = samples[0].surface;
+        if !eye.perspective || surface.is_background() {
+            return None;
+        }
+        let [a, b, c, d] = x.map(|x| eye.ray(self.accel, x, y).direction);
+        let directions = [0, 1, 2].map(|axis| Vec4::new(a[axis], b[axis], c[axis], d[axis]));
+        let reach = [eye.near, eye.far];
+        let met = self.accel.meet_four(self.scene, (eye.position, directions), reach, surface, known)?;
+        let sample = |lane: usize| {
+            let surface = met[lane]?;
+            Some(SurfaceSample { position: known.point(surface)?, surface, ..samples[lane] })
+        };
+        Some([sample(0), sample(1), sample(2), sample(3)])
     }
 
     /// Visits the triangles that open to the eye between two views; see [`Accel::turned`].
