@@ -6,7 +6,7 @@ use super::tree::Bounds;
 use super::triangle::{ShearedRay, TriangleHit};
 use super::wide::{Pending, SlabRay};
 use super::{Accel, KnownTriangles, Placed, PlacedTree};
-use crate::frame::SurfaceRef;
+use crate::frame::{FourPoints, SurfaceRef};
 use crate::scene::{Mesh, Scene};
 use glam::{Vec3, Vec4};
 
@@ -150,21 +150,14 @@ impl Accel {
         [t_min, t_max]: [f32; 2],
         surface: SurfaceRef,
         known: &mut KnownTriangles,
-    ) -> Option<[Option<SurfaceRef>; 4]> {
+    ) -> Option<FourPoints> {
         let rays = ShearedRay::four(origin, directions)?;
         let mesh = &scene.meshes[scene.instances[surface.instance as usize].mesh];
         if mesh.shape.is_some() {
             return None;
         }
         let known = known.learn(self, scene, mesh, surface);
-        if known.has_holes() {
-            return None;
-        }
-        let mut met = [None; 4];
-        for (lane, hit) in known.meet_four(&rays, t_min, t_max) {
-            met[lane] = Some(SurfaceRef { u: hit.u, v: hit.v, ..surface });
-        }
-        Some(met)
+        (!known.has_holes()).then(|| known.meet_four(&rays, t_min, t_max))
     }
 
     /// True if light passes from `from` along `direction` as far as `t_max` lengths of it: nothing there has an

@@ -1,10 +1,10 @@
 //! Triangles that rays ask for by name, again and again.
 
-use super::triangle::{PackHits, ShearedRay, TriangleHit};
+use super::triangle::{ShearedRay, TriangleHit};
 use super::{Accel, interpolate, opacity};
-use crate::frame::SurfaceRef;
+use crate::frame::{FourPoints, SurfaceRef};
 use crate::scene::{Mesh, Scene};
-use glam::{Affine3A, Vec3, Vec3A, Vec4};
+use glam::{Affine3A, Mat3A, Vec3, Vec3A, Vec4};
 
 /// Triangles that were asked for last: the next pixel mostly shows one of them. Neighbours in a mesh mostly have neighbouring
 /// numbers, so that each finds a place of its own.
@@ -91,9 +91,19 @@ impl KnownTriangle {
     }
 
     /// Where four rays meet it; neither holes nor its sides are looked for.
-    pub fn meet_four(&self, rays: &ShearedRay, t_min: f32, t_max: f32) -> PackHits {
+    pub fn meet_four(&self, rays: &ShearedRay, t_min: f32, t_max: f32) -> FourPoints {
         let corner = |number: usize| self.axes.map(|axis| Vec4::splat(axis[number]));
-        rays.meet_all(&[corner(0), corner(1), corner(2)], t_min, t_max)
+        let (met, u, v) = rays.meet_all(&[corner(0), corner(1), corner(2)], t_min, t_max).weights();
+        // To the last bit as [`Self::point`].
+        let ([a, b, c], Affine3A { matrix3, translation }) = (self.corners, self.render_from_object);
+        let rest = Vec4::ONE - u - v;
+        let [x, y, z] = [0, 1, 2].map(|axis| rest * a[axis] + u * b[axis] + v * c[axis]);
+        let Mat3A { x_axis, y_axis, z_axis } = matrix3;
+        let position = [0, 1, 2].map(|axis| {
+            let turned = x * x_axis[axis] + y * y_axis[axis] + z * z_axis[axis];
+            (turned + translation[axis]).to_array()
+        });
+        FourPoints { met, position, u: u.to_array(), v: v.to_array() }
     }
 
     /// Whether alpha may cut holes into it.

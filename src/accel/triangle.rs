@@ -81,6 +81,13 @@ impl TrianglePack {
     }
 }
 
+impl PackHits {
+    /// The bits, and the barycentric weights of the second and the third corners.
+    pub fn weights(&self) -> (u32, Vec4, Vec4) {
+        (self.mask, self.u, self.v)
+    }
+}
+
 impl Iterator for PackHits {
     type Item = (usize, TriangleHit);
 

@@ -7,7 +7,7 @@ use super::around::Trust;
 use super::buzz_buffer::BuzzBuffer;
 use super::centre::{CastCentres, ENOUGH_TO_FILL};
 use super::sources::{MOVED, NAMES, NOTHING, SUSPECT, Sources};
-use crate::frame::SurfaceSample;
+use crate::frame::{FourPoints, SurfaceSample};
 use std::ops::Range;
 
 /// Pixels of a row that are looked at together.
@@ -44,13 +44,13 @@ pub(super) struct AlikeRow<'a, R> {
     y: usize,
     /// Of the stretch and the four that the last pixel is of.
     stretch: [Option<Found>; STRETCH],
-    four: Option<[Option<SurfaceSample>; FOUR]>,
+    four: Option<FourPoints>,
 }
 
 /// Such a pixel before it is centred.
 #[derive(Debug, Clone, Copy)]
 struct Found {
-    source: usize,
+    source: u32,
     /// True if any landed away from its pixel's centre, or none.
     moved: bool,
     same: bool,
@@ -63,32 +63,44 @@ impl<'a, R: CastCentres> AlikeRow<'a, R> {
     }
 
     /// Column `x`. They are asked for in order.
+    // What is copied through memory in parts waits for itself.
+    #[inline(always)]
     pub fn at(&mut self, x: usize, memory: &mut R::Memory) -> Option<Alike> {
         let at = x % STRETCH;
         if at == 0 {
-            let said = Stretch::new(self, x);
-            self.stretch = std::array::from_fn(|at| self.found(&said, x, at));
+            self.look_at(x);
         }
         if at % FOUR == 0 {
             self.four = self.four(x, memory);
         }
         let Found { source, moved, same } = self.stretch[at]?;
-        let centre = match self.four {
-            Some(four) => four[at % FOUR],
-            None if moved => self.rays.nearest_of(x, self.y, [self.old.sample(source)].into_iter(), memory),
-            None => Some(self.old.sample(source)),
+        let source = source as usize;
+        let sample = self.old.sample(source);
+        let centre = match &self.four {
+            Some(four) => four.of(at % FOUR, &sample),
+            None if moved => self.rays.nearest_of(x, self.y, std::iter::once(sample), memory),
+            None => Some(sample),
         };
         Some(Alike { source, centre, same: same || !moved })
     }
 
     /// The centres of the four pixels from column `x` on, if all are alike and on one triangle.
-    fn four(&self, x: usize, memory: &mut R::Memory) -> Option<[Option<SurfaceSample>; FOUR]> {
+    fn four(&self, x: usize, memory: &mut R::Memory) -> Option<FourPoints> {
         let at = x % STRETCH;
         let [Some(a), Some(b), Some(c), Some(d)] = self.stretch[at..at + FOUR] else { return None };
-        let is_one = |other: Found| other.moved && self.old.is_same_primitive(a.source, other.source);
-        let four = [a, b, c, d];
-        let samples = || four.map(|found| self.old.sample(found.source));
-        four.into_iter().all(is_one).then(|| self.rays.four_on((x, self.y), samples(), memory))?
+        let first = a.source as usize;
+        let is_one = |other: Found| other.moved && self.old.is_same_primitive(first, other.source as usize);
+        let is_one = a.moved && is_one(b) && is_one(c) && is_one(d);
+        is_one.then(|| self.rays.four_on((x, self.y), self.old.surface[first], memory))?
+    }
+
+    /// Looks at the stretch from column `first` on.
+    #[inline(never)]
+    fn look_at(&mut self, first: usize) {
+        let said = Stretch::new(self, first);
+        for at in 0..STRETCH {
+            self.stretch[at] = self.found(&said, first, at);
+        }
     }
 
     fn found(&self, said: &Stretch, first: usize, at: usize) -> Option<Found> {
@@ -96,11 +108,15 @@ impl<'a, R: CastCentres> AlikeRow<'a, R> {
         if x >= self.old.width() || said.names[at] != 0 || said.flags[at] & SUSPECT != 0 {
             return None;
         }
-        let own = self.sources.of(self.y * self.old.width() + x);
+        let own = self.sources.of(self.y * self.old.width() + x).map(|i| i as u32);
         let same = said.lit[at] == 0;
         if said.missing[at] == 0 {
             let moved = said.flags[at] & MOVED != 0;
-            return own.filter(|_| same || self.agree((x, self.y))).map(|source| Found { source, moved, same });
+            return own.filter(|_| same || self.agree((x, self.y))).map(|source| Found {
+                source,
+                moved,
+                same,
+            });
         }
         // Shares are interpolated where anything is missing.
         let may_fill = self.trust == Trust::Neighbours && !self.rays.has_shares();
@@ -111,13 +127,13 @@ impl<'a, R: CastCentres> AlikeRow<'a, R> {
     }
 
     /// The first sample around a pixel on which none landed, if there are enough of them.
-    fn first_around(&self, x: usize, y: usize) -> Option<usize> {
+    fn first_around(&self, x: usize, y: usize) -> Option<u32> {
         let (width, height) = (self.old.width(), self.old.height());
         let columns = x.saturating_sub(1)..(x + 2).min(width);
         let rows = y.saturating_sub(1)..(y + 2).min(height);
         let landed = rows.flat_map(|y| self.sources.row(width, y, columns.clone()));
         let known = || landed.clone().map(|source| source & NOTHING).filter(|&i| i != NOTHING);
-        known().next().filter(|_| known().count() >= ENOUGH_TO_FILL).map(|i| i as usize)
+        known().next().filter(|_| known().count() >= ENOUGH_TO_FILL)
     }
 
     /// True if the samples of each column agree with that in its middle, and the middle ones with that of the pixel: they have
@@ -127,7 +143,8 @@ impl<'a, R: CastCentres> AlikeRow<'a, R> {
             let source = self.sources.of(y * self.old.width() + x);
             source.map_or(&[][..], |i| self.old.lit(i))
         };
-        let is_column = |x: usize| [y - 1, y + 1].into_iter().all(|y2| self.rays.agree(lit(x, y), lit(x, y2)));
+        let is_column =
+            |x: usize| [y - 1, y + 1].into_iter().all(|y2| self.rays.agree(lit(x, y), lit(x, y2)));
         let is_row = || [x - 1, x + 1].into_iter().all(|x2| self.rays.agree(lit(x, y), lit(x2, y)));
         self.rays.has_shares() && (x - 1..=x + 1).all(is_column) && is_row()
     }

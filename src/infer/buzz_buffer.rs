@@ -230,6 +230,7 @@ impl Row<'_> {
     }
 
     /// Stores a sample in column `x`; its shadow bits and class are set apart.
+    #[inline]
     pub fn put(&mut self, x: usize, view: &Projector, sample: &SurfaceSample) {
         self.z[x] = view.depth(sample);
         self.position[x] = sample.position;

@@ -16,15 +16,15 @@
 //! with the surface ([`carry`]); where they change fast from point to point, a few rays renew them.
 
 use super::Marks;
+use super::alike::{Alike, AlikeRow};
 use super::around::{Around, Trust, is_one_surface};
 use super::buzz_buffer::{BuzzBuffer, CastRays, Projector, Row, UNKNOWN};
 use super::moved::Askers;
 use super::project::Landings;
 use super::shadow_edges::ShadowEdges;
 use super::shares::carry;
-use super::alike::{Alike, AlikeRow};
 use super::sources::Sources;
-use crate::frame::{PixelClass, RayCounts, SurfaceSample};
+use crate::frame::{FourPoints, PixelClass, RayCounts, SurfaceRef, SurfaceSample};
 use rayon::prelude::*;
 
 /// What re-centring asks of the scene, beside whole rays: parts of one, and surfaces that are known already.
@@ -97,15 +97,15 @@ pub trait CastCentres: CastRays {
         memory: &mut Self::Memory,
     ) -> Option<SurfaceSample>;
 
-    /// What the rays through the centres of four pixels, the first of which is (x, y), each meet of the triangle that the
-    /// sample of its own lies on; it is the same for all. None if they have to be looked at one by one.
+    /// Where the rays through the centres of four pixels of a row, from (x, y) on, meet the triangle that `surface` lies on; to
+    /// the last bit what [`CastCentres::nearest_of`] finds. None if they have to be looked at one by one.
     fn four_on(
         &self,
         (x, y): (usize, usize),
-        samples: [SurfaceSample; 4],
+        surface: SurfaceRef,
         memory: &mut Self::Memory,
-    ) -> Option<[Option<SurfaceSample>; 4]> {
-        let _ = (x, y, samples, memory);
+    ) -> Option<FourPoints> {
+        let _ = (x, y, surface, memory);
         None
     }
 

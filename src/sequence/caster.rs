@@ -3,7 +3,7 @@
 use super::Observer;
 use super::motion::SceneMotion;
 use crate::accel::KnownTriangles;
-use crate::frame::{RayCounts, SurfaceSample};
+use crate::frame::{FourPoints, RayCounts, SurfaceRef, SurfaceSample};
 use crate::infer::{CastCentres, CastRays, Lattice, Motion};
 use crate::scene::View;
 use crate::trace::{Eye, Tracer};
@@ -125,12 +125,11 @@ impl CastCentres for Caster<'_> {
     fn four_on(
         &self,
         (x, y): (usize, usize),
-        samples: [SurfaceSample; 4],
+        surface: SurfaceRef,
         known: &mut KnownTriangles,
-    ) -> Option<[Option<SurfaceSample>; 4]> {
-        let (_, row) = self.place(x, y);
+    ) -> Option<FourPoints> {
         let columns = [x, x + 1, x + 2, x + 3].map(|x| self.place(x, y).0);
-        self.tracer.four_on(&self.eye, (columns, row), samples, known)
+        self.tracer.four_on(&self.eye, (columns, self.place(x, y).1), surface, known)
     }
 
     fn is_hidden(&self, sample: &SurfaceSample, counts: &mut RayCounts) -> bool {

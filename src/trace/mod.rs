@@ -25,7 +25,7 @@ mod whitted;
 mod world;
 
 use crate::accel::{Accel, KnownTriangles, PreparedRay, Ray, Sides};
-use crate::frame::{PackedNormal, RayCounts, SurfaceRef, SurfaceSample};
+use crate::frame::{FourPoints, PackedNormal, RayCounts, SurfaceRef, SurfaceSample};
 use crate::scene::{Pose, Scene, View};
 pub use changes::LightChanges;
 use delta_lights::{DeltaLights, is_delta};
@@ -236,28 +236,22 @@ impl<'a> Tracer<'a> {
         Some(SurfaceSample { position, surface: hit.surface, normal, ..candidate })
     }
 
-    /// What the rays through raster positions (x, y) each meet of the triangle that the sample of its own lies on, which is the
-    /// same for all. None if they have to be looked at one by one, by [`Tracer::nearest_of`].
+    /// Where the rays through raster positions (x, y) meet the triangle that `surface` lies on, and nothing else; to the last
+    /// bit what [`Tracer::nearest_of`] finds. None if they have to be looked at one by one.
     pub fn four_on(
         &self,
         eye: &Eye,
         (x, y): ([f64; 4], f64),
-        samples: [SurfaceSample; 4],
+        surface: SurfaceRef,
         known: &mut KnownTriangles,
-    ) -> Option<[Option<SurfaceSample>; 4]> {
-        let surface = samples[0].surface;
+    ) -> Option<FourPoints> {
         if !eye.perspective || surface.is_background() {
             return None;
         }
         let [a, b, c, d] = x.map(|x| eye.ray(self.accel, x, y).direction);
         let directions = [0, 1, 2].map(|axis| Vec4::new(a[axis], b[axis], c[axis], d[axis]));
         let reach = [eye.near, eye.far];
-        let met = self.accel.meet_four(self.scene, (eye.position, directions), reach, surface, known)?;
-        let sample = |lane: usize| {
-            let surface = met[lane]?;
-            Some(SurfaceSample { position: known.point(surface)?, surface, ..samples[lane] })
-        };
-        Some([sample(0), sample(1), sample(2), sample(3)])
+        self.accel.meet_four(self.scene, (eye.position, directions), reach, surface, known)
     }
 
     /// Visits the triangles that open to the eye between two views; see [`Accel::turned`].
