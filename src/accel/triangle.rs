@@ -238,6 +238,26 @@ mod tests {
             let alone = ray.meet(&axes, 0.0, 3.0).map(bits);
             prop_assert_eq!(alone, meet(&ray, corners, 0.0, 3.0).map(bits));
         }
+
+        /// Four rays together meet a triangle where each does alone, to the last bit.
+        #[test]
+        fn four_rays_meet_as_each_alone(
+            corners in prop::array::uniform3(prop::array::uniform3(-1.0..1.0f32)),
+            towards in prop::array::uniform4(prop::array::uniform2(-0.2..1.2f32)),
+            origin in prop::array::uniform3(-3.0..3.0f32),
+        ) {
+            let (corners, origin) = (corners.map(Vec3::from), Vec3::from(origin));
+            let [a, b, c] = corners;
+            let directions = towards.map(|[u, v]| a + (b - a) * u + (c - a) * v - origin);
+            let bits = |hit: TriangleHit| ([hit.t, hit.u, hit.v].map(f32::to_bits), hit.front);
+            if let Some(four) = ShearedRay::four(origin, [0, 1, 2].map(|axis| directions.map(|d| d[axis]).into())) {
+                let mut together = [None; 4];
+                let all = corners.map(|corner| corner.to_array().map(Vec4::splat));
+                four.meet_all(&all, 0.0, 3.0).for_each(|(ray, hit)| together[ray] = Some(bits(hit)));
+                let alone = directions.map(|d| meet(&ShearedRay::new(origin, d), corners, 0.0, 3.0).map(bits));
+                prop_assert_eq!(together, alone);
+            }
+        }
     }
 
     const CORNERS: [Vec3; 3] = [Vec3::ZERO, Vec3::X, Vec3::Y];

@@ -70,7 +70,7 @@ impl<'a, R: CastCentres> AlikeRow<'a, R> {
         if at == 0 {
             self.look_at(x);
         }
-        if at % FOUR == 0 {
+        if at.is_multiple_of(FOUR) {
             self.four = self.four(x, memory);
         }
         let Found { source, moved, same } = self.stretch[at]?;
