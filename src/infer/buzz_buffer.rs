@@ -229,6 +229,14 @@ impl Row<'_> {
         &mut self.lit[x * self.lit_words..][..self.lit_words]
     }
 
+    /// Stores the shadow bits of column `x`: mostly a word, which is copied without a call.
+    pub fn put_lit(&mut self, x: usize, lit: &[u32]) {
+        match (self.lit_mut(x), lit) {
+            ([to], &[word]) => *to = word,
+            (to, lit) => to.copy_from_slice(lit),
+        }
+    }
+
     /// Stores a sample in column `x`; its shadow bits and class are set apart.
     #[inline]
     pub fn put(&mut self, x: usize, view: &Projector, sample: &SurfaceSample) {
@@ -334,6 +342,7 @@ impl Projector {
     }
 
     /// Planar depth of a sample; infinite for the background.
+    #[inline]
     pub fn depth(&self, sample: &SurfaceSample) -> f32 {
         if sample.surface.is_background() {
             f32::INFINITY

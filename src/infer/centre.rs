@@ -189,7 +189,7 @@ impl Centring {
                 };
                 let mut reuse = |i: usize, sample: &SurfaceSample| {
                     row.put(x, view, sample);
-                    row.lit_mut(x).copy_from_slice(old.lit(i));
+                    row.put_lit(x, old.lit(i));
                 };
                 // Within a triangle that is lit alike all around there is no more to find out.
                 if let Some(Alike { source, centre, same }) = alike.at(x, &mut memory) {

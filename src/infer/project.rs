@@ -96,7 +96,7 @@ pub fn project(old: &BuzzBuffer, new_view: &Projector, landings: &Landings, mark
 /// are left unknown.
 pub fn gather(old: &BuzzBuffer, landings: &Landings, marks: &Marks, new: &mut BuzzBuffer) {
     let width = old.width();
-    new.rows_mut().enumerate().for_each(|(y, row)| {
+    new.rows_mut().enumerate().for_each(|(y, mut row)| {
         for x in 0..width {
             let pixel = y * width + x;
             let mark = marks.get(pixel);
@@ -115,7 +115,7 @@ pub fn gather(old: &BuzzBuffer, landings: &Landings, marks: &Marks, new: &mut Bu
             row.object[x] = old.object[i];
             row.surface[x] = old.surface[i];
             row.normal[x] = old.normal[i];
-            row.lit[x * row.lit_words..][..row.lit_words].copy_from_slice(old.lit(i));
+            row.put_lit(x, old.lit(i));
         }
     });
 }
