@@ -5,10 +5,10 @@ use super::placed_shape::PlacedShape;
 use super::tree::Bounds;
 use super::triangle::{ShearedRay, TriangleHit};
 use super::wide::{Pending, SlabRay};
-use super::{Accel, KnownTriangle, Placed, PlacedTree};
-use crate::frame::SurfaceRef;
+use super::{Accel, KnownTriangles, Placed, PlacedTree};
+use crate::frame::{FourPoints, SurfaceRef};
 use crate::scene::{Mesh, Scene};
-use glam::Vec3;
+use glam::{Vec3, Vec4};
 
 /// A ray in render space, relative to [`Accel::origin`], and the part of it that counts.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -115,14 +115,14 @@ impl Accel {
     }
 
     /// Where a ray meets one known triangle, if it does, holes cut by alpha considered. Which side it meets does not
-    /// matter; nothing else is looked at. Of a known shape, the nearest point that the eye would see is met. `known` is the
-    /// triangle that was asked for before, and becomes this one.
+    /// matter; nothing else is looked at. Of a known shape, the nearest point that the eye would see is met. `known` are triangles
+    /// that were asked for before.
     pub fn meet(
         &self,
         scene: &Scene,
         ray: &PreparedRay,
         surface: SurfaceRef,
-        known: &mut KnownTriangle,
+        known: &mut KnownTriangles,
     ) -> Option<RayHit> {
         let PreparedRay { ray, sheared } = ray;
         let index = surface.instance as usize;
@@ -133,12 +133,31 @@ impl Accel {
             let ray = LocalRay { origin, direction, t_min };
             return shape.meet(scene, &ray, t_max, Sides::Visible);
         }
-        known.learn(self, scene, mesh, surface);
+        let known = known.learn(self, scene, mesh, surface);
         let hit = known.meet(sheared, ray.t_min, ray.t_max)?;
         let present =
             !known.has_holes() || opacity::is_present_at(scene, mesh, surface.primitive, hit.u, hit.v);
         let surface = SurfaceRef { u: hit.u, v: hit.v, ..surface };
         present.then_some(RayHit { t: hit.t, surface, front: hit.front })
+    }
+
+    /// Where four rays from `origin`, of which `directions` has each axis, meet one known triangle as [`Accel::meet`] does; none
+    /// where they cannot be looked at together.
+    pub fn meet_four(
+        &self,
+        scene: &Scene,
+        (origin, directions): (Vec3, [Vec4; 3]),
+        [t_min, t_max]: [f32; 2],
+        surface: SurfaceRef,
+        known: &mut KnownTriangles,
+    ) -> Option<FourPoints> {
+        let rays = ShearedRay::four(origin, directions)?;
+        let mesh = &scene.meshes[scene.instances[surface.instance as usize].mesh];
+        if mesh.shape.is_some() {
+            return None;
+        }
+        let known = known.learn(self, scene, mesh, surface);
+        (!known.has_holes()).then(|| known.meet_four(&rays, t_min, t_max))
     }
 
     /// True if light passes from `from` along `direction` as far as `t_max` lengths of it: nothing there has an

@@ -29,7 +29,7 @@ pub use displaced::{Displaced, Posed};
 use fused::Fused;
 use glam::{Affine3A, DAffine3, DVec3, Mat3A, Vec3, Vec3A, Vec4};
 pub use intersect::{PreparedRay, Ray, RayHit, Sides};
-pub use known::KnownTriangle;
+pub use known::KnownTriangles;
 use placed_shape::PlacedShape;
 use rayon::prelude::*;
 use std::collections::HashMap;

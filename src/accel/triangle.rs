@@ -81,6 +81,13 @@ impl TrianglePack {
     }
 }
 
+impl PackHits {
+    /// The bits, and the barycentric weights of the second and the third corners.
+    pub fn weights(&self) -> (u32, Vec4, Vec4) {
+        (self.mask, self.u, self.v)
+    }
+}
+
 impl Iterator for PackHits {
     type Item = (usize, TriangleHit);
 
@@ -102,7 +109,8 @@ impl Iterator for PackHits {
     }
 }
 
-/// A ray prepared for many triangles: its origin, and the shear that turns its direction into +Z.
+/// A ray prepared for many triangles: its origin, and the shear that turns its direction into +Z. Or four of them, prepared
+/// for one triangle.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct ShearedRay {
     /// Axes: the third is the direction's longest, the others keep the triangle's winding.
@@ -115,13 +123,9 @@ pub(super) struct ShearedRay {
 impl ShearedRay {
     pub fn new(origin: Vec3, direction: Vec3) -> Self {
         let d = direction.to_array();
-        let longest = direction.abs().max_position();
-        let (mut first, mut second) = ((longest + 1) % 3, (longest + 2) % 3);
-        if d[longest] < 0.0 {
-            std::mem::swap(&mut first, &mut second);
-        }
+        let axes = axes_along(direction);
+        let [first, second, longest] = axes;
         let inverse = 1.0 / d[longest];
-        let axes = [first, second, longest];
         Self {
             axes,
             origin: axes.map(|axis| Vec4::splat(origin[axis])),
@@ -129,9 +133,29 @@ impl ShearedRay {
         }
     }
 
-    /// The hits with `t_min <= t <= t_max`. False comparisons with NaN make a miss of every degenerate case.
+    /// Four rays from one point, of which `directions` has each axis, if all look mostly along the same one.
+    pub fn four(origin: Vec3, directions: [Vec4; 3]) -> Option<Self> {
+        let axes = axes_along(Vec3::from(directions.map(|d| d.x)));
+        let [first, second, longest] = axes.map(|axis| directions[axis]);
+        let is_longest = longest.abs().cmpgt(first.abs()) & longest.abs().cmpgt(second.abs());
+        let is_forward = longest.cmpgt(Vec4::ZERO);
+        let inverse = Vec4::ONE / longest;
+        (is_longest.all() && (is_forward.all() || !is_forward.any())).then(|| Self {
+            axes,
+            origin: axes.map(|axis| Vec4::splat(origin[axis])),
+            shear: [first * inverse, second * inverse, inverse],
+        })
+    }
+
+    /// The hits with `t_min <= t <= t_max`.
     #[inline(always)]
     pub fn intersect(&self, pack: &TrianglePack, t_min: f32, t_max: f32) -> PackHits {
+        self.meet_all(&pack.corners, t_min, t_max)
+    }
+
+    /// The hits with `t_min <= t <= t_max` on triangles of which there is each corner and axis. False comparisons with NaN make a miss of every degenerate case.
+    #[inline(always)]
+    pub fn meet_all(&self, corners: &[[Vec4; 3]; 3], t_min: f32, t_max: f32) -> PackHits {
         let [kx, ky, kz] = self.axes;
         let [ox, oy, oz] = self.origin;
         let [sx, sy, sz] = self.shear;
@@ -139,7 +163,7 @@ impl ShearedRay {
             let z = corner[kz] - oz;
             [corner[kx] - ox - sx * z, corner[ky] - oy - sy * z, z]
         };
-        let [a, b, c] = &pack.corners;
+        let [a, b, c] = corners;
         let (a, b, c) = (shear(a), shear(b), shear(c));
         let wa = c[0] * b[1] - c[1] * b[0];
         let wb = a[0] * c[1] - a[1] * c[0];
@@ -183,6 +207,13 @@ impl ShearedRay {
     }
 }
 
+/// The axes of a ray's own frame: the third is the direction's longest, the others keep a triangle's winding.
+fn axes_along(direction: Vec3) -> [usize; 3] {
+    let longest = direction.abs().max_position();
+    let (first, second) = ((longest + 1) % 3, (longest + 2) % 3);
+    if direction[longest] < 0.0 { [second, first, longest] } else { [first, second, longest] }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -206,6 +237,26 @@ mod tests {
             let bits = |hit: TriangleHit| ([hit.t, hit.u, hit.v].map(f32::to_bits), hit.front);
             let alone = ray.meet(&axes, 0.0, 3.0).map(bits);
             prop_assert_eq!(alone, meet(&ray, corners, 0.0, 3.0).map(bits));
+        }
+
+        /// Four rays together meet a triangle where each does alone, to the last bit.
+        #[test]
+        fn four_rays_meet_as_each_alone(
+            corners in prop::array::uniform3(prop::array::uniform3(-1.0..1.0f32)),
+            towards in prop::array::uniform4(prop::array::uniform2(-0.2..1.2f32)),
+            origin in prop::array::uniform3(-3.0..3.0f32),
+        ) {
+            let (corners, origin) = (corners.map(Vec3::from), Vec3::from(origin));
+            let [a, b, c] = corners;
+            let directions = towards.map(|[u, v]| a + (b - a) * u + (c - a) * v - origin);
+            let bits = |hit: TriangleHit| ([hit.t, hit.u, hit.v].map(f32::to_bits), hit.front);
+            if let Some(four) = ShearedRay::four(origin, [0, 1, 2].map(|axis| directions.map(|d| d[axis]).into())) {
+                let mut together = [None; 4];
+                let all = corners.map(|corner| corner.to_array().map(Vec4::splat));
+                four.meet_all(&all, 0.0, 3.0).for_each(|(ray, hit)| together[ray] = Some(bits(hit)));
+                let alone = directions.map(|d| meet(&ShearedRay::new(origin, d), corners, 0.0, 3.0).map(bits));
+                prop_assert_eq!(together, alone);
+            }
         }
     }
 

@@ -3,6 +3,7 @@
 mod aov;
 mod class;
 mod eye;
+mod four;
 mod light_way;
 mod quality;
 mod sample;
@@ -11,6 +12,7 @@ mod stats;
 pub use aov::{Aov, AovSet, Frame, FrameKind, Matte, Window};
 pub use class::PixelClass;
 pub use eye::{FrameId, StereoEye};
+pub use four::FourPoints;
 pub use light_way::{LightWay, Way};
 pub use quality::Quality;
 pub use sample::{PackedNormal, SurfaceRef, SurfaceSample};

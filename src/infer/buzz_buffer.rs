@@ -229,7 +229,16 @@ impl Row<'_> {
         &mut self.lit[x * self.lit_words..][..self.lit_words]
     }
 
+    /// Stores the shadow bits of column `x`: mostly a word, which is copied without a call.
+    pub fn put_lit(&mut self, x: usize, lit: &[u32]) {
+        match (self.lit_mut(x), lit) {
+            ([to], &[word]) => *to = word,
+            (to, lit) => to.copy_from_slice(lit),
+        }
+    }
+
     /// Stores a sample in column `x`; its shadow bits and class are set apart.
+    #[inline]
     pub fn put(&mut self, x: usize, view: &Projector, sample: &SurfaceSample) {
         self.z[x] = view.depth(sample);
         self.position[x] = sample.position;
@@ -275,6 +284,7 @@ pub struct Projector {
     far: f32,
     width: f32,
     height: f32,
+    columns: usize,
     /// Side of a pixel at planar depth 1, or anywhere in parallel projection.
     pixel: f32,
 }
@@ -302,6 +312,7 @@ impl Projector {
             far: view.lens.far as f32,
             width: view.width as f32,
             height: view.height as f32,
+            columns: view.width as usize,
             pixel: view.pixel_size() as f32,
         }
     }
@@ -331,6 +342,7 @@ impl Projector {
     }
 
     /// Planar depth of a sample; infinite for the background.
+    #[inline]
     pub fn depth(&self, sample: &SurfaceSample) -> f32 {
         if sample.surface.is_background() {
             f32::INFINITY
@@ -348,7 +360,7 @@ impl Projector {
     /// Number of the pixel that holds raster position (x, y), if it is in the window.
     pub fn pixel(&self, x: f32, y: f32) -> Option<usize> {
         let inside = x >= 0.0 && y >= 0.0 && x < self.width && y < self.height;
-        inside.then(|| y as usize * self.width as usize + x as usize)
+        inside.then(|| y as u32 as usize * self.columns + x as u32 as usize)
     }
 
     /// The direction in which a ray of this view passes through `position`; not normalised.

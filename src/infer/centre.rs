@@ -16,14 +16,15 @@
 //! with the surface ([`carry`]); where they change fast from point to point, a few rays renew them.
 
 use super::Marks;
+use super::alike::{Alike, AlikeRow};
 use super::around::{Around, Showing, Trust, believes_cells, is_one_surface};
 use super::buzz_buffer::{BuzzBuffer, CastRays, Projector, Row, UNKNOWN};
 use super::moved::Askers;
 use super::project::Landings;
 use super::shadow_edges::ShadowEdges;
 use super::shares::carry;
-use super::sources::{Alike, Sources};
-use crate::frame::{PixelClass, RayCounts, SurfaceSample};
+use super::sources::Sources;
+use crate::frame::{FourPoints, PixelClass, RayCounts, SurfaceRef, SurfaceSample};
 use rayon::prelude::*;
 
 /// What re-centring asks of the scene, beside whole rays: parts of one, and surfaces that are known already.
@@ -96,6 +97,18 @@ pub trait CastCentres: CastRays {
         memory: &mut Self::Memory,
     ) -> Option<SurfaceSample>;
 
+    /// Where the rays through the centres of four pixels of a row, from (x, y) on, meet the triangle that `surface` lies on; to
+    /// the last bit what [`CastCentres::nearest_of`] finds. None if they have to be looked at one by one.
+    fn four_on(
+        &self,
+        (x, y): (usize, usize),
+        surface: SurfaceRef,
+        memory: &mut Self::Memory,
+    ) -> Option<FourPoints> {
+        let _ = (x, y, surface, memory);
+        None
+    }
+
     /// True if something hides the sample from the eye. Counted as `visibility`.
     fn is_hidden(&self, sample: &SurfaceSample, counts: &mut RayCounts) -> bool;
 }
@@ -131,6 +144,15 @@ impl Grid {
     }
 }
 
+/// The class of a pixel, by what landed on it and by what was found at its centre; else `class`.
+fn class_of<L, C>(landed: Option<L>, centred: Option<C>, class: PixelClass) -> PixelClass {
+    match (landed, centred) {
+        (None, Some(_)) => PixelClass::Filled,
+        (Some(_), None) => PixelClass::Edge,
+        _ => class,
+    }
+}
+
 /// What re-centring holds between frames, so that nothing is allocated for each.
 #[derive(Debug, Default)]
 pub struct Centring {
@@ -143,10 +165,10 @@ pub struct Centring {
 }
 
 impl Centring {
-    /// The most that it holds for each pixel with so many words of shadow bits: a source and the lights to ask, and, where
-    /// every pixel is at a shadow's edge, its number three times, the lights to ask and the bits then.
+    /// The most that it holds for each pixel with so many words of shadow bits: its source, the lights to ask and
+    /// those in doubt, and, where every pixel is at a shadow's edge, its number three times, the lights to ask and the bits then.
     pub fn bytes_per_pixel(words: usize) -> usize {
-        (1 + 2 * words + 3 + 2 * words) * size_of::<u32>()
+        Sources::bytes_per_pixel(words) + (2 * words + 3 + 2 * words) * size_of::<u32>()
     }
 
     /// Centres what can be centred without a ray. All other pixels are left unknown; their class says why.
@@ -159,7 +181,7 @@ impl Centring {
         trust: Trust,
         new: &mut BuzzBuffer,
     ) {
-        self.sources.settle(landings, marks);
+        self.sources.settle(old, landings, marks);
         let (width, words) = (old.width(), old.lit_words());
         // Without lights there are no words, but a chunk's length may not be zero.
         for bits in [&mut self.ask, &mut self.doubt] {
@@ -178,7 +200,8 @@ impl Centring {
             ask.fill(0);
             doubt.fill(if rays.has_shares() { u32::MAX } else { 0 });
             let mut memory = R::Memory::default();
-            for (x, alike) in sources.alike(old, y, rays).enumerate() {
+            let mut alike = AlikeRow::new(old, sources, rays, trust, y);
+            for x in 0..width {
                 let pixel = y * width + x;
                 let [ask, doubt] = [&mut *ask, &mut *doubt].map(|bits| &mut bits[x * words..][..words]);
                 let own = sources.of(pixel);
@@ -190,26 +213,21 @@ impl Centring {
                 };
                 let mut reuse = |i: usize, sample: &SurfaceSample| {
                     row.put(x, view, sample);
-                    row.lit_mut(x).copy_from_slice(old.lit(i));
+                    row.put_lit(x, old.lit(i));
                 };
-                if sources.is_suspect(pixel) {
+                // Within a triangle that is lit alike all around there is no more to find out.
+                if let Some(Alike { source, centre, same }) = alike.at(x, &mut memory) {
+                    if let Some(sample) = centre {
+                        reuse(source, &sample);
+                        if !same {
+                            carry((old, source), view, (x, y), &sample, rays, (row.lit_mut(x), ask));
+                            spare((x, y), ask);
+                        }
+                    }
+                    row.class[x] = class_of(own, centre, row.class[x]);
                     continue;
                 }
-                // Within a triangle that is lit alike all around there is no more to find out.
-                if let Some(Alike { source, moved, same }) = alike {
-                    let sample = old.sample(source);
-                    let mut centre = || rays.nearest_of(x, y, std::iter::once(sample), &mut memory);
-                    let centred = if moved { centre() } else { Some(sample) };
-                    match centred {
-                        Some(sample) => {
-                            reuse(source, &sample);
-                            if moved && !same {
-                                carry((old, source), view, (x, y), &sample, rays, (row.lit_mut(x), ask));
-                                spare((x, y), ask);
-                            }
-                        }
-                        None => row.class[x] = PixelClass::Edge,
-                    }
+                if sources.is_suspect(pixel) {
                     continue;
                 }
                 let around = Around::new(old, view, sources, (x, y), 1);
@@ -247,11 +265,7 @@ impl Centring {
                         }
                     }
                 }
-                row.class[x] = match (own, centred) {
-                    (None, Some(_)) => PixelClass::Filled,
-                    (Some(_), None) => PixelClass::Edge,
-                    _ => row.class[x],
-                };
+                row.class[x] = class_of(own, centred, row.class[x]);
             }
         });
     }

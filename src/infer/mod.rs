@@ -20,6 +20,7 @@
 //! | moving objects, voxels; moving and variable lights | [`Motion`], [`Voxels`] |
 //! | (not in the paper) samples at pixel centres, shadows' edges followed | [`Centring`] |
 
+mod alike;
 mod around;
 mod buzz_buffer;
 mod cell;

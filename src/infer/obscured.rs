@@ -10,7 +10,7 @@
 //! surface, the lines of its rim bound the hidden volume already.
 
 use super::Marks;
-use super::buzz_buffer::{BuzzBuffer, Projector, pixels_around};
+use super::buzz_buffer::{BuzzBuffer, Projector, UNKNOWN, pixels_around};
 use super::project::Landings;
 use crate::frame::PixelClass;
 use glam::{Vec2, Vec4};
@@ -30,13 +30,13 @@ pub fn obscured(
 ) {
     let (width, height) = (old.width(), old.height());
     (0..height).into_par_iter().with_min_len(8).for_each(|y| {
-        let (mut left, mut middle) = (None, Column::new(old, 0, y));
+        let mut smooth = [false; STRETCH];
         for x in 0..width {
+            if x % STRETCH == 0 {
+                smooth = are_smooth(old, x, y);
+            }
             let i = y * width + x;
-            let right = Column::new(old, x + 1, y);
-            let smooth = is_smooth(old.z[i], [left, middle, right]);
-            (left, middle) = (middle, right);
-            if smooth || old.surface[i].is_background() || !hides_something(old, x, y) {
+            if smooth[x % STRETCH] || old.surface[i].is_background() || !hides_something(old, x, y) {
                 continue;
             }
             let position = old.position[i];
@@ -59,33 +59,37 @@ pub fn obscured(
     });
 }
 
-/// Three pixels over one another that show one object.
-#[derive(Clone, Copy)]
-struct Column {
-    object: u32,
-    deepest: f32,
-}
+/// Pixels of a row that are looked at together.
+const STRETCH: usize = 64;
 
-impl Column {
-    /// The column of pixel (x, y), if it is in the image and of one object.
-    fn new(old: &BuzzBuffer, x: usize, y: usize) -> Option<Self> {
-        let width = old.width();
-        if x >= width || y == 0 || y + 1 >= old.height() {
-            return None;
-        }
-        let i = y * width + x;
-        let [above, object, below] = [i - width, i, i + width].map(|n| old.object[n]);
-        let deepest = old.z[i - width].max(old.z[i]).max(old.z[i + width]);
-        (above == object && below == object).then_some(Self { object, deepest })
+/// For each pixel of a stretch of row `y`, from column `first` on, whether the 3x3 around it is of one object without a step
+/// down: it hides nothing, as nearly everywhere. Not at the sides of the image.
+fn are_smooth(old: &BuzzBuffer, first: usize, y: usize) -> [bool; STRETCH] {
+    let (width, height) = (old.width(), old.height());
+    if y == 0 || y + 1 >= height {
+        return [false; STRETCH];
     }
-}
-
-/// True where the 3x3 around a sample at depth `z` is of one object without a step down: it hides nothing, as nearly
-/// everywhere.
-fn is_smooth(z: f32, columns: [Option<Column>; 3]) -> bool {
-    let [Some(left), Some(middle), Some(right)] = columns else { return false };
-    let one_object = left.object == middle.object && right.object == middle.object;
-    one_object && left.deepest.max(middle.deepest).max(right.deepest) <= z * DEPTH_STEP
+    let columns = first.saturating_sub(1)..(first + STRETCH + 1).min(width);
+    // Where `columns` begin; what lies outside the image is like nothing in it.
+    let at = columns.start + 1 - first;
+    let rows = [y - 1, y, y + 1].map(|y| y * width + columns.start..y * width + columns.end);
+    let (mut objects, mut deepest) = ([UNKNOWN; STRETCH + 2], [f32::INFINITY; STRETCH + 2]);
+    let (mut middle, mut differs) = ([0.0; STRETCH + 2], [0; STRETCH + 2]);
+    // First down each column, then along the row.
+    let [above, own, below] = rows.clone().map(|row| &old.object[row]);
+    for (x, ((above, own), below)) in above.iter().zip(own).zip(below).enumerate() {
+        (objects[at + x], differs[at + x]) = (*own, own ^ above | own ^ below);
+    }
+    let [above, own, below] = rows.map(|row| &old.z[row]);
+    for (x, ((above, own), below)) in above.iter().zip(own).zip(below).enumerate() {
+        (middle[at + x], deepest[at + x]) = (*own, above.max(*own).max(*below));
+    }
+    std::array::from_fn(|x| {
+        let differs = differs[x] | differs[x + 1] | differs[x + 2];
+        let differs = differs | objects[x] ^ objects[x + 1] | objects[x + 2] ^ objects[x + 1];
+        let deepest = deepest[x].max(deepest[x + 1]).max(deepest[x + 2]);
+        differs == 0 && deepest <= middle[x + 1] * DEPTH_STEP
+    })
 }
 
 /// True where one of the eight neighbours lies behind the sample, or is not known because the image ends.

@@ -33,7 +33,8 @@ impl Landings {
 
     /// Lands old sample `i` on the pixel that holds it; marks the pixel if another is there.
     pub(super) fn land(&self, pixel: usize, at: Projected, i: usize, marks: &Marks) {
-        let is_away = |raster: f32| (raster - raster.trunc() - 0.5).abs() >= AT_CENTRE;
+        // Within the window the integer part is the floor, for which there would be a call.
+        let is_away = |raster: f32| (raster - raster as i32 as f32 - 0.5).abs() >= AT_CENTRE;
         if self.land_beside(pixel, at.z, i, is_away(at.x) || is_away(at.y)) {
             marks.set(pixel, PixelClass::Overlapped);
         }
@@ -70,12 +71,14 @@ pub fn project(old: &BuzzBuffer, new_view: &Projector, landings: &Landings, mark
     let width = old.width();
     let project_row = |y: usize| {
         let mut nearest = f32::INFINITY;
-        for i in y * width..(y + 1) * width {
-            if old.object[i] == UNKNOWN {
+        let row = y * width..(y + 1) * width;
+        let (object, surface) = (&old.object[row.clone()], &old.surface[row.clone()]);
+        let places = old.position[row.clone()].iter().zip(&old.normal[row.clone()]);
+        for (i, ((object, surface), (&position, normal))) in row.zip(object.iter().zip(surface).zip(places)) {
+            if *object == UNKNOWN {
                 continue;
             }
-            let background = old.surface[i].is_background();
-            let Some(p) = new_view.project(old.position[i], old.normal[i].direction(), background) else {
+            let Some(p) = new_view.project(position, normal.direction(), surface.is_background()) else {
                 continue;
             };
             nearest = nearest.min(p.z);
@@ -93,7 +96,7 @@ pub fn project(old: &BuzzBuffer, new_view: &Projector, landings: &Landings, mark
 /// are left unknown.
 pub fn gather(old: &BuzzBuffer, landings: &Landings, marks: &Marks, new: &mut BuzzBuffer) {
     let width = old.width();
-    new.rows_mut().enumerate().for_each(|(y, row)| {
+    new.rows_mut().enumerate().for_each(|(y, mut row)| {
         for x in 0..width {
             let pixel = y * width + x;
             let mark = marks.get(pixel);
@@ -112,7 +115,7 @@ pub fn gather(old: &BuzzBuffer, landings: &Landings, marks: &Marks, new: &mut Bu
             row.object[x] = old.object[i];
             row.surface[x] = old.surface[i];
             row.normal[x] = old.normal[i];
-            row.lit[x * row.lit_words..][..row.lit_words].copy_from_slice(old.lit(i));
+            row.put_lit(x, old.lit(i));
         }
     });
 }

@@ -5,7 +5,7 @@
 //! quarters', by area (T. Whitted, *An Improved Illumination Model for Shaded Display*, 1980).
 
 use super::resolve::{Pixel, Resolver};
-use crate::accel::KnownTriangle;
+use crate::accel::KnownTriangles;
 use crate::frame::{Frame, RayCounts, SurfaceSample};
 use crate::infer::{BuzzBuffer, Level, Position, Samples, SubPixels};
 use crate::trace::Shader;
@@ -158,7 +158,7 @@ fn between<'a>(
     let lattice = known.lattice;
     let [x, y] = at.map(|c| lattice.to_raster(c));
     let candidates = around.clone().map(|(sample, _)| sample);
-    let met = resolver.tracer.nearest_of(&resolver.eye, x, y, candidates, &mut KnownTriangle::default());
+    let met = resolver.tracer.nearest_of(&resolver.eye, x, y, candidates, &mut KnownTriangles::default());
     let primitive = |s: &SurfaceSample| (s.surface.instance, s.surface.primitive);
     let of_same =
         |met: &SurfaceSample| around.clone().find(|(sample, _)| primitive(sample) == primitive(met));

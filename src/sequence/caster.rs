@@ -2,8 +2,8 @@
 
 use super::Observer;
 use super::motion::SceneMotion;
-use crate::accel::KnownTriangle;
-use crate::frame::{RayCounts, SurfaceSample};
+use crate::accel::KnownTriangles;
+use crate::frame::{FourPoints, RayCounts, SurfaceRef, SurfaceSample};
 use crate::infer::{CastCentres, CastRays, Lattice, Motion};
 use crate::scene::View;
 use crate::trace::{Eye, Tracer};
@@ -64,7 +64,7 @@ impl CastRays for Caster<'_> {
 }
 
 impl CastCentres for Caster<'_> {
-    type Memory = KnownTriangle;
+    type Memory = KnownTriangles;
 
     fn hit(&self, x: usize, y: usize, counts: &mut RayCounts) -> SurfaceSample {
         let (x, y) = self.place(x, y);
@@ -116,10 +116,20 @@ impl CastCentres for Caster<'_> {
         x: usize,
         y: usize,
         candidates: impl Iterator<Item = SurfaceSample>,
-        known: &mut KnownTriangle,
+        known: &mut KnownTriangles,
     ) -> Option<SurfaceSample> {
         let (x, y) = self.place(x, y);
         self.tracer.nearest_of(&self.eye, x, y, candidates, known)
+    }
+
+    fn four_on(
+        &self,
+        (x, y): (usize, usize),
+        surface: SurfaceRef,
+        known: &mut KnownTriangles,
+    ) -> Option<FourPoints> {
+        let columns = [x, x + 1, x + 2, x + 3].map(|x| self.place(x, y).0);
+        self.tracer.four_on(&self.eye, (columns, self.place(x, y).1), surface, known)
     }
 
     fn is_hidden(&self, sample: &SurfaceSample, counts: &mut RayCounts) -> bool {

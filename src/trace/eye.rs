@@ -41,6 +41,7 @@ impl Eye {
     }
 
     /// The ray through raster position (x, y), from the near plane to the far plane; its parameter is planar depth.
+    #[inline]
     pub(super) fn ray(&self, accel: &Accel, x: f64, y: f64) -> Ray {
         let ray = self.view.ray_within(self.half_extent, x, y);
         let origin = if self.perspective { self.position } else { (ray.origin - accel.origin()).as_vec3() };

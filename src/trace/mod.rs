@@ -13,6 +13,7 @@ mod eye;
 mod form_factor;
 mod ggx;
 mod interaction;
+mod known;
 mod lanes;
 mod light;
 mod point;
@@ -24,7 +25,7 @@ mod visibility;
 mod whitted;
 mod world;
 
-use crate::accel::{Accel, KnownTriangle, PreparedRay, Ray, Sides};
+use crate::accel::{Accel, Ray, Sides};
 use crate::frame::{PackedNormal, RayCounts, SurfaceRef, SurfaceSample};
 use crate::scene::{Pose, Scene, View};
 pub use changes::LightChanges;
@@ -198,42 +199,6 @@ impl<'a> Tracer<'a> {
     /// Sets the shares in `lit` to the weighted mean of those that are `known`; single bits stay.
     pub fn blend<'b>(&self, known: impl Iterator<Item = (&'b [u32], f32)> + Clone, lit: &mut [u32]) {
         self.layout.blend(known, lit);
-    }
-
-    /// What the ray through raster position (x, y) meets first if it can meet nothing but the triangles and shapes
-    /// of `candidates`; no ray is cast into the scene, and none is counted. Where the candidates are the background, that.
-    /// `known` is remembered from one call to the next.
-    pub fn nearest_of(
-        &self,
-        eye: &Eye,
-        x: f64,
-        y: f64,
-        candidates: impl Iterator<Item = SurfaceSample>,
-        known: &mut KnownTriangle,
-    ) -> Option<SurfaceSample> {
-        let ray = eye.ray(self.accel, x, y);
-        let mut prepared = PreparedRay::new(ray);
-        let mut nearest = None;
-        for candidate in candidates {
-            if candidate.surface.is_background() {
-                return Some(SurfaceSample::background(ray.direction.normalize_or(Vec3::NEG_Z)));
-            }
-            let Some(hit) = self.accel.meet(self.scene, &prepared, candidate.surface, known) else {
-                continue;
-            };
-            prepared.end_at(hit.t);
-            nearest = Some((hit, candidate));
-        }
-        let (hit, candidate) = nearest?;
-        if let Some(position) = known.point(hit.surface) {
-            // A triangle looks the same way everywhere, as it was seen before.
-            return Some(SurfaceSample { position, surface: hit.surface, ..candidate });
-        }
-        let position = self.accel.surface_point(self.scene, hit.surface);
-        let outward = self.accel.shape_normal(self.scene, hit.surface);
-        let seen = outward.map(|n| PackedNormal::new(if hit.front { n } else { -n }));
-        let normal = seen.unwrap_or(candidate.normal);
-        Some(SurfaceSample { position, surface: hit.surface, normal, ..candidate })
     }
 
     /// Visits the triangles that open to the eye between two views; see [`Accel::turned`].

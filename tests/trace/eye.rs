@@ -1,6 +1,8 @@
 //! What depends on the eye: sides, clipping, highlights, mirrors.
 
 use crate::rig::*;
+use buzz::accel::KnownTriangles;
+use buzz::frame::RayCounts;
 use buzz::scene::{LightKind, Material, Mesh, Projection, Scene};
 use glam::{DAffine3, DQuat, DVec3, Vec3};
 use std::f32::consts::PI;
@@ -189,4 +191,28 @@ fn a_sphere_is_round() {
     assert!((sample.position.length() - 1.0).abs() < 2e-3);
     assert!(normal.angle_between(sample.position) < 2e-3);
     assert!(sample.normal.get().angle_between(sample.position) < 0.05);
+}
+
+/// Four pixels that are looked at together see of a triangle what each sees alone, to the last bit.
+#[test]
+fn four_pixels_see_a_triangle_as_each_alone() {
+    let mut scene = Scene::default();
+    let turned = DAffine3::from_rotation_translation(DQuat::from_rotation_x(0.4), DVec3::new(0.3, -0.2, 0.1));
+    add_plane(&mut scene, matt(Vec3::ONE), 1.0, turned);
+    scene.add_camera(DVec3::new(0.0, 4.0, 0.0), DVec3::ZERO, 0.8);
+    let rig = Rig::new(scene);
+    let (tracer, mut known) = (rig.tracer(), KnownTriangles::default());
+    let eye = tracer.eye(&rig.view());
+    let (mut seen, mut missed) = (0, 0);
+    for (x, y) in (0..65).flat_map(|y| (0..61).map(move |x| (f64::from(x) + 0.5, f64::from(y) + 0.5))) {
+        let sample = tracer.hit(&eye, x, y, &mut RayCounts::default());
+        let columns = [x, x + 1.0, x + 2.0, x + 3.0];
+        let Some(four) = tracer.four_on(&eye, (columns, y), sample.surface, &mut known) else { continue };
+        for (ray, x) in columns.into_iter().enumerate() {
+            let alone = tracer.nearest_of(&eye, x, y, std::iter::once(sample), &mut known);
+            assert_eq!(four.of(ray, &sample), alone);
+            *if alone.is_some() { &mut seen } else { &mut missed } += 1;
+        }
+    }
+    assert!(seen > 1000 && missed > 10, "{seen} {missed}");
 }

@@ -1,7 +1,7 @@
 //! Analytic shapes against arithmetic: their areas on the image, their shadows, their light.
 
 use crate::rig::*;
-use buzz::accel::KnownTriangle;
+use buzz::accel::KnownTriangles;
 use buzz::scene::{Material, Mesh, Quadric, Scene, Shape};
 use glam::{DAffine3, DMat3, DQuat, DVec3, Vec3};
 use std::f64::consts::PI;
@@ -130,7 +130,7 @@ fn a_neighbours_shape_gives_the_same_sample() {
                     f64::from(x) + 0.5,
                     f64::from(y) + 0.5,
                     [before].into_iter(),
-                    &mut KnownTriangle::default(),
+                    &mut KnownTriangles::default(),
                 );
                 assert_eq!(again, Some(here));
             }
