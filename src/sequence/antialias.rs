@@ -8,7 +8,7 @@ use super::resolve::{Pixel, Resolver};
 use crate::accel::KnownTriangle;
 use crate::frame::{Frame, RayCounts, SurfaceSample};
 use crate::infer::{BuzzBuffer, Level, Position, Samples, SubPixels};
-use crate::trace::Shader;
+use crate::trace::{SHADED_AT_ONCE, Shader};
 use glam::Vec4;
 use rayon::prelude::*;
 
@@ -45,11 +45,15 @@ impl Antialias {
         let count = buffer.object.len();
         self.pixels.resize(count, Pixel::default());
         let shader = || resolver.tracer.shader();
-        let shade_pixel = |shader: &mut Shader<'_, '_>, (i, pixel): (usize, &mut Pixel)| {
-            resolver.shade_sample(shader, &resolver.eye, (&buffer.sample(i), buffer.lit(i)), pixel)
+        let shade_pixels = |shader: &mut Shader<'_, '_>, (k, pixels): (usize, &mut [Pixel])| {
+            let mut counts = RayCounts::default();
+            if resolver.observer.stop_requested().is_none() {
+                resolver.shade_pixels(shader, buffer, k * SHADED_AT_ONCE, pixels, &mut counts);
+            }
+            counts
         };
-        let pixels = self.pixels.par_iter_mut().enumerate().with_min_len(64);
-        let mut counts: RayCounts = pixels.map_init(shader, shade_pixel).sum();
+        let pixels = self.pixels.par_chunks_mut(SHADED_AT_ONCE).enumerate().with_min_len(16);
+        let mut counts: RayCounts = pixels.map_init(shader, shade_pixels).sum();
         for depth in 0..self.shaded.levels.len() {
             let (coarser, level) = self.shaded.levels.split_at_mut(depth);
             let (Some(level), Some(own)) = (level.first_mut(), buffer.finer.levels.get(depth)) else { break };
@@ -127,17 +131,32 @@ fn shade_level(
     let (stride, words) = (level.stride(), level.words());
     let half = level.cells.side() as u32 / 2;
     let Level { cells, samples, lit, .. } = level;
-    let places = cells.positions().par_iter().zip(samples).zip(lit.par_chunks_mut(stride)).zip(pixels);
+    let lit = lit.par_chunks_mut(stride * SHADED_AT_ONCE);
+    let places = cells.positions().par_chunks(SHADED_AT_ONCE).zip(samples.par_chunks_mut(SHADED_AT_ONCE));
+    let places = places.zip(lit).zip(pixels.par_chunks_mut(SHADED_AT_ONCE));
     let shader = || resolver.tracer.shader();
-    type Place<'p> = (((&'p Position, &'p mut SurfaceSample), &'p mut [u32]), &'p mut Pixel);
-    let shade = |shader: &mut Shader<'_, '_>, (((&at, sample), lit), pixel): Place<'_>| {
-        let found = stored.at(at).or_else(|| between(resolver, known, at, half));
-        let Some((found, bits)) = found else { return RayCounts::default() };
-        *sample = found;
-        lit[..words].copy_from_slice(bits);
-        resolver.shade_sample(shader, &eye, (sample, &lit[..words]), pixel)
+    type Places<'p> = (((&'p [Position], &'p mut [SurfaceSample]), &'p mut [u32]), &'p mut [Pixel]);
+    let shade = |shader: &mut Shader<'_, '_>, (((places, samples), lit), pixels): Places<'_>| {
+        let mut counts = RayCounts::default();
+        if resolver.observer.stop_requested().is_some() {
+            return counts;
+        }
+        let mut is_found = [false; SHADED_AT_ONCE];
+        for (k, &at) in places.iter().enumerate() {
+            if let Some((found, bits)) = stored.at(at).or_else(|| between(resolver, known, at, half)) {
+                samples[k] = found;
+                lit[k * stride..][..words].copy_from_slice(bits);
+                is_found[k] = true;
+            }
+        }
+        let mut seen = [None; SHADED_AT_ONCE];
+        for (k, sample) in samples.iter().enumerate().filter(|&(k, _)| is_found[k]) {
+            seen[k] = Some((*sample, &lit[k * stride..][..words]));
+        }
+        resolver.shade_four(shader, &eye, &seen, pixels, &mut counts);
+        counts
     };
-    places.with_min_len(64).map_init(shader, shade).sum()
+    places.with_min_len(16).map_init(shader, shade).sum()
 }
 
 /// The sample between others that lie on one surface under the same lights: no ray is needed to see it. Where the ray
@@ -187,10 +206,12 @@ impl Resolver<'_> {
             frame,
             buffer.width(),
             || (),
-            |(), pixel, _| {
-                let mut mean = Pixel::default();
-                antialias.visit(buffer, pixel, |number, weight| mean.add(&antialias.pixels[number], weight));
-                mean
+            |(), first, means, _| {
+                for (pixel, mean) in (first..).zip(means) {
+                    *mean = Pixel::default();
+                    antialias
+                        .visit(buffer, pixel, |number, weight| mean.add(&antialias.pixels[number], weight));
+                }
             },
         );
         counts

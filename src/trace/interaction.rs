@@ -48,47 +48,41 @@ struct TextureCoordinates {
 }
 
 impl<'a> SurfaceInteraction<'a> {
-    /// The record of `point`; `view` is the unit direction to the eye, which decides how far a slanted footprint reaches.
-    /// Texture coordinates are found only if the material `is_textured`.
+    /// The record of `point` before anything is looked up.
     #[inline]
-    pub fn new(
-        scene: &'a Scene,
-        accel: &'a Accel,
-        point: &'a SurfacePoint<'a>,
-        is_textured: bool,
-        view: Vec3,
-        beam: Beam,
-    ) -> Self {
-        let (mesh, surface) = (point.mesh, point.surface);
-        let normal = point.geometric;
-        let mut this = Self { scene, point, normal, footprint: 0.0, uv: TextureCoordinates::default() };
+    pub fn geometric(scene: &'a Scene, point: &'a SurfacePoint<'a>) -> Self {
+        Self { scene, point, normal: point.geometric, footprint: 0.0, uv: TextureCoordinates::default() }
+    }
+
+    /// Finds the shading normal and the texture coordinates; `view` is the unit direction to the eye, which decides how far
+    /// a slanted footprint reaches. Texture coordinates are found only if the material `is_textured`.
+    #[inline]
+    pub fn look_up(&mut self, accel: &Accel, is_textured: bool, view: Vec3, beam: Beam) {
+        let SurfacePoint { mesh, surface, placement, corners, weights, .. } = *self.point;
         if is_textured {
             // Seen at a slant, the footprint is an ellipse; a square of the same area stands for it.
-            let slant = normal.dot(view).abs().max(0.05);
-            this.footprint = beam.width / slant.sqrt();
-            this.uv = this.coordinates(0);
+            let slant = self.normal.dot(view).abs().max(0.05);
+            self.footprint = beam.width / slant.sqrt();
+            self.uv = self.coordinates(0);
         }
         let index = surface.instance as usize;
-        let placement = this.point.placement;
-        let corners = this.point.corners;
         let normals = accel.normals(index, mesh);
         if !normals.is_empty() {
             let [a, b, c] = corners.map(|i| Vec3A::from(normals[i]));
             let normal = placement.normals * interpolate(a, b, c, surface);
-            this.normal = this.facing(Vec3::from(normal).normalize_or(this.point.geometric));
+            self.normal = self.facing(Vec3::from(normal).normalize_or(self.point.geometric));
         }
-        if let Some(map) = &this.point.material.normal_texture {
+        if let Some(map) = &self.point.material.normal_texture {
             let tangents = accel.tangents(index, mesh);
             let tangent = (!tangents.is_empty()).then(|| {
                 let [a, b, c] = corners.map(|i| tangents[i]);
-                let [wa, wb, wc] = this.point.weights;
+                let [wa, wb, wc] = weights;
                 let t = a * wa + b * wb + c * wc;
                 let m = &placement.render_from_object;
                 (Vec3::from(m.transform_vector3a(Vec3A::from_vec4(t))), t.w * placement.winding)
             });
-            this.normal = this.mapped(map, tangent);
+            self.normal = self.mapped(map, tangent);
         }
-        this
     }
 
     /// `normal` turned to the side that is seen. Vertex normals that point into the surface are taken as meant for
