@@ -199,7 +199,8 @@ impl Level {
         let left = neighbour(wraps[0], x0, self.width) as usize;
         let right = neighbour(wraps[0], x0.wrapping_add(1), self.width) as usize;
         let top = self.first + (neighbour(wraps[1], y0, self.height) * self.width) as usize;
-        let bottom = self.first + (neighbour(wraps[1], y0.wrapping_add(1), self.height) * self.width) as usize;
+        let bottom =
+            self.first + (neighbour(wraps[1], y0.wrapping_add(1), self.height) * self.width) as usize;
         let (a, b) = (decode(texels[top + left]), decode(texels[top + right]));
         let (c, d) = (decode(texels[bottom + left]), decode(texels[bottom + right]));
         let (upper, lower) = (a + (b - a) * fx, c + (d - c) * fx);

@@ -9,7 +9,7 @@ use crate::accel::KnownTriangle;
 use crate::frame::{Frame, RayCounts, SurfaceSample};
 use crate::infer::{BuzzBuffer, Level, Position, Samples, SubPixels};
 use crate::trace::{SHADED_AT_ONCE, Shader};
-use glam::Vec4;
+use glam::{Vec3, Vec4};
 use rayon::prelude::*;
 
 /// Corners of a cell differ in colour if any channel, encoded for display, does by more than this share of its range: what
@@ -128,7 +128,7 @@ fn shade_level(
     pixels: &mut [Pixel],
 ) -> RayCounts {
     let eye = resolver.eye.finer(depth + 1);
-    let (stride, words) = (level.stride(), level.words());
+    let stride = level.stride();
     let half = level.cells.side() as u32 / 2;
     let Level { cells, samples, lit, .. } = level;
     let lit = lit.par_chunks_mut(stride * SHADED_AT_ONCE);
@@ -141,19 +141,17 @@ fn shade_level(
         if resolver.observer.stop_requested().is_some() {
             return counts;
         }
-        let mut is_found = [false; SHADED_AT_ONCE];
-        for (k, &at) in places.iter().enumerate() {
-            if let Some((found, bits)) = stored.at(at).or_else(|| between(resolver, known, at, half)) {
-                samples[k] = found;
-                lit[k * stride..][..words].copy_from_slice(bits);
-                is_found[k] = true;
-            }
+        let mut words_of = [[].as_slice(); SHADED_AT_ONCE];
+        for (k, (&at, lit)) in places.iter().zip(lit.chunks_mut(stride)).enumerate() {
+            // Where nothing is known around, nothing is there.
+            let found = stored.at(at).or_else(|| between(resolver, known, at, half));
+            let nothing = || (SurfaceSample::background(Vec3::NEG_Z), Default::default());
+            let (found, bits) = found.unwrap_or_else(nothing);
+            samples[k] = found;
+            lit[..bits.len()].copy_from_slice(bits);
+            words_of[k] = bits;
         }
-        let mut seen = [None; SHADED_AT_ONCE];
-        for (k, sample) in samples.iter().enumerate().filter(|&(k, _)| is_found[k]) {
-            seen[k] = Some((*sample, &lit[k * stride..][..words]));
-        }
-        resolver.shade_four(shader, &eye, &seen, pixels, &mut counts);
+        resolver.shade_four(shader, &eye, samples, words_of, pixels, &mut counts);
         counts
     };
     places.with_min_len(16).map_init(shader, shade).sum()

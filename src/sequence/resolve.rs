@@ -6,7 +6,7 @@ use crate::accel::Displaced;
 use crate::frame::{Aov, Frame, FrameKind, FrameStats, Matte, RayCounts, SurfaceSample, Window};
 use crate::infer::BuzzBuffer;
 use crate::scene::{Scene, View};
-use crate::trace::{Eye, Radiance, SHADED_AT_ONCE, Seen, Shader, Tracer};
+use crate::trace::{Eye, Radiance, SHADED_AT_ONCE, Shader, Tracer};
 use glam::{DVec3, DVec4, Vec3, Vec4};
 use rayon::iter::Either;
 use rayon::prelude::*;
@@ -152,11 +152,13 @@ impl Resolver<'_> {
         pixels: &mut [Pixel],
         counts: &mut RayCounts,
     ) {
-        let mut seen = [None; SHADED_AT_ONCE];
-        for (i, seen) in (first..first + pixels.len()).zip(&mut seen) {
-            *seen = Some((buffer.sample(i), buffer.lit(i)));
+        let mut samples = [SurfaceSample::background(Vec3::ZERO); SHADED_AT_ONCE];
+        let mut lit = [[].as_slice(); SHADED_AT_ONCE];
+        for (k, i) in (first..first + pixels.len()).enumerate() {
+            samples[k] = buffer.sample(i);
+            lit[k] = buffer.lit(i);
         }
-        self.shade_four(shader, &self.eye, &seen, pixels, counts);
+        self.shade_four(shader, &self.eye, &samples[..pixels.len()], lit, pixels, counts);
     }
 
     /// Fills the layers that come from shading, row by row and a few pixels of a row at a time; each row has a `state` of
@@ -193,22 +195,20 @@ impl Resolver<'_> {
         rows(frame, width).enumerate().map(|(y, row)| fill_row(y, row)).sum()
     }
 
-    /// Shades samples, under their shadow bits, of pixels or sub-pixels as wide as `eye` has them. What is not there leaves its
-    /// pixel as it is.
+    /// Shades samples, under their shadow bits, of pixels or sub-pixels as wide as `eye` has them.
     pub(super) fn shade_four(
         &self,
         shader: &mut Shader<'_, '_>,
         eye: &Eye,
-        seen: &[Option<Seen<'_>>; SHADED_AT_ONCE],
+        samples: &[SurfaceSample],
+        lit: [&[u32]; SHADED_AT_ONCE],
         pixels: &mut [Pixel],
         counts: &mut RayCounts,
     ) {
         let mut radiance = Default::default();
-        shader.shade_four(eye, seen, counts, &mut radiance);
-        for ((pixel, seen), radiance) in pixels.iter_mut().zip(seen).zip(&radiance) {
-            if let Some((sample, _)) = seen {
-                *pixel = self.pixel(sample, radiance);
-            }
+        shader.shade_four(eye, samples, lit, counts, &mut radiance);
+        for ((pixel, sample), radiance) in pixels.iter_mut().zip(samples).zip(&radiance) {
+            *pixel = self.pixel(sample, radiance);
         }
     }
 

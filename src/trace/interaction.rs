@@ -3,7 +3,7 @@
 use super::point::SurfacePoint;
 use crate::accel::{Accel, interpolate};
 use crate::scene::{NormalTexture, Scene, TextureRef};
-use glam::{Vec2, Vec3, Vec3A};
+use glam::{Vec2, Vec3, Vec3A, Vec4};
 
 /// A shading normal is never nearer to the surface than this cosine.
 const MIN_NORMAL_COSINE: f32 = 0.01;
@@ -22,6 +22,13 @@ impl Beam {
     pub fn after(self, distance: f32) -> Self {
         Self { width: self.width + self.spread * distance, spread: self.spread }
     }
+}
+
+/// Sides of the squares over which textures are averaged, for beams so wide that meet surfaces at so steep an angle.
+#[inline]
+pub(super) fn footprints(widths: Vec4, cosines: Vec4) -> Vec4 {
+    // Seen at a slant, the footprint is an ellipse; a square of the same area stands for it.
+    widths / cosines.abs().max(Vec4::splat(0.05)).sqrt()
 }
 
 /// A point on a surface with what its textures say, in render space.
@@ -54,15 +61,12 @@ impl<'a> SurfaceInteraction<'a> {
         Self { scene, point, normal: point.geometric, footprint: 0.0, uv: TextureCoordinates::default() }
     }
 
-    /// Finds the shading normal and the texture coordinates; `view` is the unit direction to the eye, which decides how far
-    /// a slanted footprint reaches. Texture coordinates are found only if the material `is_textured`.
+    /// Finds the shading normal and the texture coordinates; those only if the material `is_textured`.
     #[inline]
-    pub fn look_up(&mut self, accel: &Accel, is_textured: bool, view: Vec3, beam: Beam) {
+    pub fn look_up(&mut self, accel: &Accel, is_textured: bool, footprint: f32) {
         let SurfacePoint { mesh, surface, placement, corners, weights, .. } = *self.point;
         if is_textured {
-            // Seen at a slant, the footprint is an ellipse; a square of the same area stands for it.
-            let slant = self.normal.dot(view).abs().max(0.05);
-            self.footprint = beam.width / slant.sqrt();
+            self.footprint = footprint;
             self.uv = self.coordinates(0);
         }
         let index = surface.instance as usize;
@@ -141,7 +145,7 @@ impl<'a> SurfaceInteraction<'a> {
     }
 
     /// The texture at this point, averaged over its footprint.
-    pub fn texture(&self, texture: &TextureRef) -> glam::Vec4 {
+    pub fn texture(&self, texture: &TextureRef) -> Vec4 {
         let TextureCoordinates { uv, density, .. } = self.coordinates_of(texture.uv_set);
         let scale = texture.transform.matrix2.determinant().abs();
         let scale = if scale == 1.0 { 1.0 } else { scale.sqrt() };
@@ -150,9 +154,9 @@ impl<'a> SurfaceInteraction<'a> {
     }
 
     /// The interpolated vertex colour; white where the mesh has none.
-    pub fn vertex_color(&self) -> glam::Vec4 {
+    pub fn vertex_color(&self) -> Vec4 {
         if self.point.mesh.colors.is_empty() {
-            return glam::Vec4::ONE;
+            return Vec4::ONE;
         }
         let [a, b, c] = self.point.corners.map(|i| self.point.mesh.colors[i]);
         a * self.point.weights[0] + b * self.point.weights[1] + c * self.point.weights[2]

@@ -31,12 +31,12 @@ use crate::scene::{Pose, Scene, View};
 pub use changes::LightChanges;
 use delta_lights::{DeltaLights, is_delta};
 pub use eye::Eye;
-use glam::Vec3;
-use interaction::{Beam, SurfaceInteraction};
+use glam::{Vec3, Vec4};
+use interaction::{Beam, SurfaceInteraction, footprints};
 use light::Emitter;
 use point::{Side, SurfacePoint};
 use shader::finite;
-pub use shader::{SHADED_AT_ONCE, Seen, Shader};
+pub use shader::{SHADED_AT_ONCE, Shader};
 use std::f32::consts::FRAC_1_PI;
 use surface::{ShadingMaterial, Surface, occlusion};
 use visibility::{Field, Inquiry, Layout};
@@ -362,14 +362,15 @@ impl<'a> Tracer<'a> {
         beam: Beam,
     ) -> SurfaceInteraction<'b> {
         let mut it = SurfaceInteraction::geometric(self.scene, point);
-        self.look_up(&mut it, toward, beam);
+        let cosine = point.geometric.dot(toward);
+        self.look_up(&mut it, footprints(Vec4::splat(beam.width), Vec4::splat(cosine)).x);
         it
     }
 
     /// Finds what is known at a point besides its geometry.
     #[inline]
-    fn look_up(&self, it: &mut SurfaceInteraction, toward: Vec3, beam: Beam) {
-        it.look_up(self.accel, self.material(it).is_textured, toward, beam);
+    fn look_up(&self, it: &mut SurfaceInteraction, footprint: f32) {
+        it.look_up(self.accel, self.material(it).is_textured, footprint);
     }
 
     /// What the material says at a point; `room` holds what is not the same everywhere.

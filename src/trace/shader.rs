@@ -1,6 +1,6 @@
 //! Shading of many samples: the paper's *enhancement*.
 
-use super::interaction::{Beam, SurfaceInteraction};
+use super::interaction::{Beam, SurfaceInteraction, footprints};
 use super::lanes::{LANES, Lanes, Vec3x4};
 use super::point::{Side, SurfacePoint};
 use super::receivers::{Brought, Receivers};
@@ -9,12 +9,10 @@ use super::whitted::{Incoming, Path};
 use super::{Eye, Radiance, Tracer};
 use crate::frame::{RayCounts, SurfaceSample};
 use glam::Vec3;
+use std::slice;
 
 /// How many samples are shaded at once.
 pub const SHADED_AT_ONCE: usize = LANES;
-
-/// A sample and its shadow bits.
-pub type Seen<'s> = (SurfaceSample, &'s [u32]);
 
 /// Shades samples that lie side by side. Neighbours mostly lie on one triangle, so it keeps what it knows of the last ones;
 /// values do not depend on the order.
@@ -49,38 +47,34 @@ impl Shader<'_, '_> {
         rays: &mut RayCounts,
     ) -> Radiance {
         let mut radiance = Default::default();
-        self.shade_four(eye, &[Some((*sample, lit)), None, None, None], rays, &mut radiance);
+        self.shade_four(eye, slice::from_ref(sample), [lit; SHADED_AT_ONCE], rays, &mut radiance);
         radiance[0]
     }
 
-    /// What the eye sees of four samples, or fewer. Everything that depends on the eye is worked out anew, for cast and reused
-    /// samples alike. Counts `reflection` and `refraction`.
+    /// What the eye sees of four samples, or fewer, each with its shadow bits. Everything that depends on the eye is worked out
+    /// anew, for cast and reused samples alike. Counts `reflection` and `refraction`.
     pub fn shade_four(
         &mut self,
         eye: &Eye,
-        seen: &[Option<Seen<'_>>; SHADED_AT_ONCE],
+        samples: &[SurfaceSample],
+        lit: [&[u32]; SHADED_AT_ONCE],
         rays: &mut RayCounts,
         radiance: &mut [Radiance; SHADED_AT_ONCE],
     ) {
-        let is_surface = |seen: &&Seen<'_>| !seen.0.surface.is_background();
-        if let Some(some) = seen.iter().flatten().find(is_surface) {
+        let is_surface = |sample: &SurfaceSample| !sample.surface.is_background();
+        if let Some(some) = samples.iter().position(is_surface) {
             // A lane that shows no surface does as another one, and is not asked for.
-            let (mut lanes, mut shown) = ([some; LANES], [false; LANES]);
-            for (lane, seen) in seen.iter().enumerate() {
-                if let Some(seen) = seen.as_ref().filter(is_surface) {
-                    (lanes[lane], shown[lane]) = (seen, true);
-                }
+            let (mut lanes, mut bits) = ([&samples[some]; LANES], [lit[some]; LANES]);
+            let mut shown = [false; LANES];
+            for (lane, sample) in samples.iter().enumerate().filter(|(_, sample)| is_surface(sample)) {
+                (lanes[lane], bits[lane], shown[lane]) = (sample, lit[lane], true);
             }
-            self.enhance(eye, lanes, shown, rays, radiance);
+            self.enhance(eye, (lanes, bits), shown, rays, radiance);
         }
-        for (seen, radiance) in seen.iter().zip(radiance) {
-            if let Some((sample, _)) = seen
-                && sample.surface.is_background()
-            {
-                let angle = eye.pixel * f32::from(eye.perspective);
-                let emission = finite(self.tracer.world.radiance(sample.position, angle));
-                *radiance = Radiance { emission, alpha: 1.0, ..Radiance::default() };
-            }
+        for (sample, radiance) in samples.iter().zip(radiance).filter(|(sample, _)| !is_surface(sample)) {
+            let angle = eye.pixel * f32::from(eye.perspective);
+            let emission = finite(self.tracer.world.radiance(sample.position, angle));
+            *radiance = Radiance { emission, alpha: 1.0, ..Radiance::default() };
         }
     }
 
@@ -88,19 +82,21 @@ impl Shader<'_, '_> {
     fn enhance(
         &mut self,
         eye: &Eye,
-        seen: [&Seen<'_>; LANES],
+        (samples, lit): ([&SurfaceSample; LANES], [&[u32]; LANES]),
         shown: [bool; LANES],
         rays: &mut RayCounts,
         radiance: &mut [Radiance; LANES],
     ) {
         let tracer = self.tracer;
-        let Some(points) = self.points(seen) else { return };
-        let (toward, widths) = eye.seen_from_four(Vec3x4::of(|lane| seen[lane].0.position));
+        let Some(points) = self.points(samples) else { return };
+        let (toward, widths) = eye.seen_from_four(Vec3x4::of(|lane| samples[lane].position));
         let beam = |lane: usize| Beam { width: widths[lane], spread: eye.spread() };
+        let geometric = Vec3x4::of(|lane| points[lane].geometric);
+        let footprints = footprints(widths, geometric.dot(toward));
         // Filled where they are: to move them would cost as much as to fill them.
         let mut its = points.each_ref().map(|point| SurfaceInteraction::geometric(tracer.scene, point));
         for (lane, it) in its.iter_mut().enumerate() {
-            tracer.look_up(it, toward.lane(lane), beam(lane));
+            tracer.look_up(it, footprints[lane]);
         }
         let [mut a, mut b, mut c, mut d] = [const { None }; LANES];
         let surfaces = [
@@ -111,7 +107,6 @@ impl Shader<'_, '_> {
         ];
         let shaded = Lanes::of(|lane| !points[lane].material.unlit);
         let (receivers, mut brought) = (Receivers::new(&its, surfaces, toward), Brought::default());
-        let lit = [seen[0].1, seen[1].1, seen[2].1, seen[3].1];
         for (field, lights) in &tracer.single_lights {
             let asked = field.lanes(lit) & shaded;
             if !asked.is_empty() {
@@ -127,25 +122,25 @@ impl Shader<'_, '_> {
                 incoming.irradiance += brought.irradiance.lane(lane);
                 incoming.highlights += highlights.lane(lane);
             }
-            let leaving = tracer.leaving(it, surface, toward, &incoming, &Path::new(beam(lane)), rays);
-            radiance[lane] = leaving.or_black();
+            radiance[lane] = tracer.leaving(it, surface, toward, &incoming, &Path::new(beam(lane)), rays);
+            if !radiance[lane].total().is_finite() {
+                radiance[lane] = radiance[lane].where_finite();
+            }
         }
     }
 
     /// Where four samples are.
     #[inline]
-    fn points(&mut self, seen: [&Seen<'_>; LANES]) -> Option<&[SurfacePoint<'_>; LANES]> {
+    fn points(&mut self, samples: [&SurfaceSample; LANES]) -> Option<&[SurfacePoint<'_>; LANES]> {
         let Tracer { scene, accel, .. } = *self.tracer;
         let side = |sample: &SurfaceSample| Side::Towards(sample.normal.direction());
         if self.points.is_empty() {
-            let (sample, _) = seen[0];
-            let point = SurfacePoint::new(scene, accel, sample.surface, side(sample));
+            let point = SurfacePoint::new(scene, accel, samples[0].surface, side(samples[0]));
             self.points.resize(LANES, point);
         }
         let points = <&mut [_; LANES]>::try_from(self.points.as_mut_slice()).ok()?;
         // The triangles first: what is copied of one is then not what was just written.
-        for lane in 0..LANES {
-            let (sample, _) = seen[lane];
+        for (lane, sample) in samples.into_iter().enumerate() {
             let beside = (lane + LANES - 1) % LANES;
             if points[lane].shares_triangle(sample.surface) {
             } else if points[beside].shares_triangle(sample.surface) {
@@ -154,8 +149,7 @@ impl Shader<'_, '_> {
                 points[lane] = SurfacePoint::new(scene, accel, sample.surface, side(sample));
             }
         }
-        for (lane, point) in points.iter_mut().enumerate() {
-            let (sample, _) = seen[lane];
+        for (point, sample) in points.iter_mut().zip(samples) {
             point.place(sample.surface, side(sample));
         }
         Some(points)
@@ -187,11 +181,9 @@ impl Tracer<'_> {
 
 impl Radiance {
     /// The same, without the parts in which arithmetic on extreme input has overflowed.
-    fn or_black(self) -> Self {
-        if self.total().is_finite() {
-            return self;
-        }
-        let Self { diffuse, specular, emission, alpha } = self;
+    #[cold]
+    fn where_finite(&self) -> Self {
+        let Self { diffuse, specular, emission, alpha } = *self;
         Self { diffuse: finite(diffuse), specular: finite(specular), emission: finite(emission), alpha }
     }
 }
