@@ -122,10 +122,9 @@ impl Shader<'_, '_> {
                 incoming.irradiance += brought.irradiance.lane(lane);
                 incoming.highlights += highlights.lane(lane);
             }
-            radiance[lane] = tracer.leaving(it, surface, toward, &incoming, &Path::new(beam(lane)), rays);
-            if !radiance[lane].total().is_finite() {
-                radiance[lane] = radiance[lane].where_finite();
-            }
+            let leaving = tracer.leaving(it, surface, toward, &incoming, &Path::new(beam(lane)), rays);
+            let is_finite = leaving.total().is_finite();
+            radiance[lane] = if is_finite { leaving } else { leaving.where_finite() };
         }
     }
 

@@ -166,6 +166,7 @@ fn may_mirror(normal: Vec3, view: Vec3, light: Vec3, chord: f32, alpha: f32) -> 
 
 impl Tracer<'_> {
     /// What leaves `it` along `toward`, given what arrives there.
+    #[inline]
     pub(super) fn leaving(
         &self,
         it: &SurfaceInteraction,
