@@ -161,12 +161,11 @@ impl Image {
         let last = self.levels.len() - 1;
         let wraps = [texture.wrap_u, texture.wrap_v];
         let at = Vec2::new(wrapped(wraps[0], uv.x), wrapped(wraps[1], uv.y));
+        let (level, weight) = level_and_weight(width);
         if texture.nearest {
-            let (level, weight) = level_and_weight(width);
             let level = if weight < 0.5 { level } else { level + 1 };
             return decode(texels[self.levels[level.min(last)].nearest(wraps, at)]);
         }
-        let (level, weight) = level_and_weight(width);
         let fine = level.min(last);
         let a = self.levels[fine].bilinear(texels, wraps, at, &decode);
         if fine == last || weight == 0.0 {
@@ -253,18 +252,24 @@ fn whole_part(x: f32) -> f32 {
     if x.abs() < MOST { (x - 0.5 + NO_FRACTION) - NO_FRACTION } else { x }
 }
 
-/// The mip level at which `width` texels of the full size are one to two, and the weight of the next level: the logarithm to
-/// base 2, straight between powers of two. That is never off by more than 0.09, and levels blend straight anyway. Up to
-/// one texel, and for NaN, it is the full image.
+/// The mip level at which `width` texels of the full size are one to two, and the weight of the next level. Up to one texel, and
+/// for NaN, it is the full image.
 #[inline]
 fn level_and_weight(width: f32) -> (usize, f32) {
-    const MANTISSA: u32 = 1 << 23;
     if width > 1.0 {
-        let bits = width.to_bits();
-        ((bits / MANTISSA) as usize - 127, (bits % MANTISSA) as f32 / MANTISSA as f32)
+        let lod = log2(width);
+        let level = lod as u32;
+        (level as usize, lod - level as f32)
     } else {
         (0, 0.0)
     }
+}
+
+/// Logarithm to base 2 of a normal positive number, straight between powers of two: never off by more than 0.09,
+/// and a mip level blends straight anyway.
+#[inline]
+fn log2(x: f32) -> f32 {
+    x.to_bits() as f32 / 8_388_608.0 - 127.0
 }
 
 /// `texels`, checked against the size that they should have.

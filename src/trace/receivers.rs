@@ -43,12 +43,13 @@ impl Receivers {
         let each = |value: fn(&Surface) -> f32| {
             Vec4::new(value(surfaces[0]), value(surfaces[1]), value(surfaces[2]), value(surfaces[3]))
         };
+        let reflectance = |end: usize| Vec3x4::of(|lane| surfaces[lane].reflectances()[end]);
         Self {
             positions: Vec3x4::of(|lane| its[lane].point.position),
             normals: Vec3x4::of(|lane| its[lane].normal),
             toward,
             alpha: each(|surface| surface.alpha),
-            reflectances: [0, 1].map(|end| Vec3x4::of(|lane| surfaces[lane].reflectances()[end])),
+            reflectances: [reflectance(0), reflectance(1)],
             etas: each(|surface| surface.eta.unwrap_or(1.0)),
             bend: Lanes::of(|lane| surfaces[lane].eta.is_some()),
             scatter: Lanes::of(|lane| surfaces[lane].albedo != Vec3::ZERO),

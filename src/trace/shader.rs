@@ -21,14 +21,14 @@ pub const SHADED_AT_ONCE: usize = LANES;
 /// asked for by all of them before the next stage waits for it. None of them changes what another one looks like.
 pub struct Shader<'t, 'a> {
     tracer: &'t Tracer<'a>,
-    /// Where the last samples are; none at first, then one to a lane.
-    points: Vec<SurfacePoint<'a>>,
+    /// Where the last samples are, one to a lane.
+    points: Option<[SurfacePoint<'a>; LANES]>,
 }
 
 impl<'a> Tracer<'a> {
     /// For the samples of one thread.
     pub fn shader(&self) -> Shader<'_, 'a> {
-        Shader { tracer: self, points: Vec::with_capacity(LANES) }
+        Shader { tracer: self, points: None }
     }
 
     /// [`Shader::shade`] for a single sample.
@@ -88,13 +88,14 @@ impl Shader<'_, '_> {
         radiance: &mut [Radiance; LANES],
     ) {
         let tracer = self.tracer;
-        let Some(points) = self.points(samples) else { return };
+        let points = self.points(samples);
         let (toward, widths) = eye.seen_from_four(Vec3x4::of(|lane| samples[lane].position));
         let beam = |lane: usize| Beam { width: widths[lane], spread: eye.spread() };
-        let geometric = Vec3x4::of(|lane| points[lane].geometric);
-        let footprints = footprints(widths, geometric.dot(toward));
+        let normals = Vec3x4::of(|lane| points[lane].geometric);
+        let footprints = footprints(widths, normals.dot(toward));
         // Filled where they are: to move them would cost as much as to fill them.
-        let mut its = points.each_ref().map(|point| SurfaceInteraction::geometric(tracer.scene, point));
+        let geometric = |lane: usize| SurfaceInteraction::geometric(tracer.scene, &points[lane]);
+        let mut its = [geometric(0), geometric(1), geometric(2), geometric(3)];
         for (lane, it) in its.iter_mut().enumerate() {
             tracer.look_up(it, footprints[lane]);
         }
@@ -130,28 +131,26 @@ impl Shader<'_, '_> {
 
     /// Where four samples are.
     #[inline]
-    fn points(&mut self, samples: [&SurfaceSample; LANES]) -> Option<&[SurfacePoint<'_>; LANES]> {
+    fn points(&mut self, samples: [&SurfaceSample; LANES]) -> &[SurfacePoint<'_>; LANES] {
         let Tracer { scene, accel, .. } = *self.tracer;
         let side = |sample: &SurfaceSample| Side::Towards(sample.normal.direction());
-        if self.points.is_empty() {
-            let point = SurfacePoint::new(scene, accel, samples[0].surface, side(samples[0]));
-            self.points.resize(LANES, point);
-        }
-        let points = <&mut [_; LANES]>::try_from(self.points.as_mut_slice()).ok()?;
-        // The triangles first: what is copied of one is then not what was just written.
+        let new = |sample: &SurfaceSample| SurfacePoint::new(scene, accel, sample.surface, side(sample));
+        let points = self.points.get_or_insert_with(|| {
+            let point = new(samples[0]);
+            [point.clone(), point.clone(), point.clone(), point]
+        });
+        // The triangles first: what is copied of one is then not what was just written, which would have to be waited for.
         for (lane, sample) in samples.into_iter().enumerate() {
-            let beside = (lane + LANES - 1) % LANES;
-            if points[lane].shares_triangle(sample.surface) {
-            } else if points[beside].shares_triangle(sample.surface) {
-                points[lane] = points[beside].clone();
-            } else {
-                points[lane] = SurfacePoint::new(scene, accel, sample.surface, side(sample));
+            let beside = &points[(lane + LANES - 1) % LANES];
+            if !points[lane].shares_triangle(sample.surface) {
+                let shared = beside.shares_triangle(sample.surface);
+                points[lane] = if shared { beside.clone() } else { new(sample) };
             }
         }
         for (point, sample) in points.iter_mut().zip(samples) {
             point.place(sample.surface, side(sample));
         }
-        Some(points)
+        points
     }
 }
 
