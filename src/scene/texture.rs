@@ -161,27 +161,26 @@ impl Image {
         let last = self.levels.len() - 1;
         let wraps = [texture.wrap_u, texture.wrap_v];
         let at = Vec2::new(wrapped(wraps[0], uv.x), wrapped(wraps[1], uv.y));
+        let (level, weight) = level_and_weight(width);
         if texture.nearest {
-            let level = if width > 1.0 { (log2(width) + 0.5) as usize } else { 0 };
+            let level = if weight < 0.5 { level } else { level + 1 };
             return decode(texels[self.levels[level.min(last)].nearest(wraps, at)]);
         }
-        // NaN compares false and reads the full image.
-        let lod = if width > 1.0 { log2(width) } else { 0.0 };
-        let fine = (lod as usize).min(last);
+        let fine = level.min(last);
         let a = self.levels[fine].bilinear(texels, wraps, at, &decode);
-        if fine == last || lod == 0.0 {
+        if fine == last || weight == 0.0 {
             return a;
         }
         let b = self.levels[fine + 1].bilinear(texels, wraps, at, &decode);
-        a + (b - a) * (lod - fine as f32)
+        a + (b - a) * weight
     }
 }
 
 impl Level {
     /// The number of the texel nearest to `at`, which is wrapped already.
     fn nearest(&self, wraps: [Wrap; 2], at: Vec2) -> usize {
-        let x = neighbour(wraps[0], floor(at.x * self.width as f32), self.width);
-        let y = neighbour(wraps[1], floor(at.y * self.height as f32), self.height);
+        let x = neighbour(wraps[0], (at.x * self.width as f32) as i32, self.width);
+        let y = neighbour(wraps[1], (at.y * self.height as f32) as i32, self.height);
         self.first + (y * self.width + x) as usize
     }
 
@@ -194,14 +193,13 @@ impl Level {
         at: Vec2,
         decode: impl Fn(T) -> Vec4,
     ) -> Vec4 {
-        let x = at.x * self.width as f32 - 0.5;
-        let y = at.y * self.height as f32 - 0.5;
-        let (x0, y0) = (floor(x), floor(y));
-        let (fx, fy) = (x - x0 as f32, y - y0 as f32);
+        let (x0, fx) = between(at.x * self.width as f32);
+        let (y0, fy) = between(at.y * self.height as f32);
         let left = neighbour(wraps[0], x0, self.width) as usize;
-        let right = neighbour(wraps[0], x0 + 1, self.width) as usize;
+        let right = neighbour(wraps[0], x0.wrapping_add(1), self.width) as usize;
         let top = self.first + (neighbour(wraps[1], y0, self.height) * self.width) as usize;
-        let bottom = self.first + (neighbour(wraps[1], y0 + 1, self.height) * self.width) as usize;
+        let bottom =
+            self.first + (neighbour(wraps[1], y0.wrapping_add(1), self.height) * self.width) as usize;
         let (a, b) = (decode(texels[top + left]), decode(texels[top + right]));
         let (c, d) = (decode(texels[bottom + left]), decode(texels[bottom + right]));
         let (upper, lower) = (a + (b - a) * fx, c + (d - c) * fx);
@@ -232,17 +230,39 @@ fn neighbour(wrap: Wrap, x: i32, size: u32) -> u32 {
     (if x > last { after } else { x }) as u32
 }
 
-/// `f32::floor` without a call into the C library, which it is on plain x86-64.
+/// Added to a float of up to [`MOST`], it leaves no bits for a fraction: what remains is the nearest integer, in the lowest
+/// bits. Plain x86-64 has no rounding but that, and calls into the C library.
+const NO_FRACTION: f32 = 12_582_912.0;
+
+/// The most that is rounded so.
+const MOST: f32 = 4_194_304.0;
+
+/// The number of the texel whose centre is at or before `x` texels, and how far on it is towards the next one. On a
+/// centre it may be the end of the one step instead of the start of the other, which reads the same.
 #[inline]
-fn floor(x: f32) -> i32 {
-    let i = x as i32;
-    i - i32::from(x < i as f32)
+fn between(x: f32) -> (i32, f32) {
+    let rounded = (x - 1.0) + NO_FRACTION;
+    let number = (rounded.to_bits() as i32).wrapping_sub(NO_FRACTION.to_bits() as i32);
+    (number, (x - 0.5) - (rounded - NO_FRACTION))
 }
 
-/// The integer at or below `x`; beyond 2^23 floats are integers themselves.
+/// The integer at or below `x`, or for an integer the one before; large ones are as they are.
 #[inline]
 fn whole_part(x: f32) -> f32 {
-    if x.abs() < 8_388_608.0 { floor(x) as f32 } else { x }
+    if x.abs() < MOST { (x - 0.5 + NO_FRACTION) - NO_FRACTION } else { x }
+}
+
+/// The mip level at which `width` texels of the full size are one to two, and the weight of the next level. Up to one texel, and
+/// for NaN, it is the full image.
+#[inline]
+fn level_and_weight(width: f32) -> (usize, f32) {
+    if width > 1.0 {
+        let lod = log2(width);
+        let level = lod as u32;
+        (level as usize, lod - level as f32)
+    } else {
+        (0, 0.0)
+    }
 }
 
 /// Logarithm to base 2 of a normal positive number, straight between powers of two: never off by more than 0.09,

@@ -8,8 +8,8 @@ use super::resolve::{Pixel, Resolver};
 use crate::accel::KnownTriangles;
 use crate::frame::{Frame, RayCounts, SurfaceSample};
 use crate::infer::{BuzzBuffer, Level, Position, Samples, SubPixels};
-use crate::trace::Shader;
-use glam::Vec4;
+use crate::trace::{SHADED_AT_ONCE, Shader};
+use glam::{Vec3, Vec4};
 use rayon::prelude::*;
 
 /// Corners of a cell differ in colour if any channel, encoded for display, does by more than this share of its range: what
@@ -45,11 +45,15 @@ impl Antialias {
         let count = buffer.object.len();
         self.pixels.resize(count, Pixel::default());
         let shader = || resolver.tracer.shader();
-        let shade_pixel = |shader: &mut Shader<'_, '_>, (i, pixel): (usize, &mut Pixel)| {
-            resolver.shade_sample(shader, &resolver.eye, (&buffer.sample(i), buffer.lit(i)), pixel)
+        let shade_pixels = |shader: &mut Shader<'_, '_>, (k, pixels): (usize, &mut [Pixel])| {
+            let mut counts = RayCounts::default();
+            if resolver.observer.stop_requested().is_none() {
+                resolver.shade_pixels(shader, buffer, k * SHADED_AT_ONCE, pixels, &mut counts);
+            }
+            counts
         };
-        let pixels = self.pixels.par_iter_mut().enumerate().with_min_len(64);
-        let mut counts: RayCounts = pixels.map_init(shader, shade_pixel).sum();
+        let pixels = self.pixels.par_chunks_mut(SHADED_AT_ONCE).enumerate().with_min_len(16);
+        let mut counts: RayCounts = pixels.map_init(shader, shade_pixels).sum();
         for depth in 0..self.shaded.levels.len() {
             let (coarser, level) = self.shaded.levels.split_at_mut(depth);
             let (Some(level), Some(own)) = (level.first_mut(), buffer.finer.levels.get(depth)) else { break };
@@ -124,20 +128,33 @@ fn shade_level(
     pixels: &mut [Pixel],
 ) -> RayCounts {
     let eye = resolver.eye.finer(depth + 1);
-    let (stride, words) = (level.stride(), level.words());
+    let stride = level.stride();
     let half = level.cells.side() as u32 / 2;
     let Level { cells, samples, lit, .. } = level;
-    let places = cells.positions().par_iter().zip(samples).zip(lit.par_chunks_mut(stride)).zip(pixels);
+    let lit = lit.par_chunks_mut(stride * SHADED_AT_ONCE);
+    let places = cells.positions().par_chunks(SHADED_AT_ONCE).zip(samples.par_chunks_mut(SHADED_AT_ONCE));
+    let places = places.zip(lit).zip(pixels.par_chunks_mut(SHADED_AT_ONCE));
     let shader = || resolver.tracer.shader();
-    type Place<'p> = (((&'p Position, &'p mut SurfaceSample), &'p mut [u32]), &'p mut Pixel);
-    let shade = |shader: &mut Shader<'_, '_>, (((&at, sample), lit), pixel): Place<'_>| {
-        let found = stored.at(at).or_else(|| between(resolver, known, at, half));
-        let Some((found, bits)) = found else { return RayCounts::default() };
-        *sample = found;
-        lit[..words].copy_from_slice(bits);
-        resolver.shade_sample(shader, &eye, (sample, &lit[..words]), pixel)
+    type Places<'p> = (((&'p [Position], &'p mut [SurfaceSample]), &'p mut [u32]), &'p mut [Pixel]);
+    let shade = |shader: &mut Shader<'_, '_>, (((places, samples), lit), pixels): Places<'_>| {
+        let mut counts = RayCounts::default();
+        if resolver.observer.stop_requested().is_some() {
+            return counts;
+        }
+        let mut words_of = [[].as_slice(); SHADED_AT_ONCE];
+        for (k, (&at, lit)) in places.iter().zip(lit.chunks_mut(stride)).enumerate() {
+            // Where nothing is known around, nothing is there.
+            let found = stored.at(at).or_else(|| between(resolver, known, at, half));
+            let nothing = || (SurfaceSample::background(Vec3::NEG_Z), Default::default());
+            let (found, bits) = found.unwrap_or_else(nothing);
+            samples[k] = found;
+            lit[..bits.len()].copy_from_slice(bits);
+            words_of[k] = bits;
+        }
+        resolver.shade_four(shader, &eye, samples, words_of, pixels, &mut counts);
+        counts
     };
-    places.with_min_len(64).map_init(shader, shade).sum()
+    places.with_min_len(16).map_init(shader, shade).sum()
 }
 
 /// The sample between others that lie on one surface under the same lights: no ray is needed to see it. Where the ray
@@ -187,10 +204,12 @@ impl Resolver<'_> {
             frame,
             buffer.width(),
             || (),
-            |(), pixel, _| {
-                let mut mean = Pixel::default();
-                antialias.visit(buffer, pixel, |number, weight| mean.add(&antialias.pixels[number], weight));
-                mean
+            |(), first, means, _| {
+                for (pixel, mean) in (first..).zip(means) {
+                    *mean = Pixel::default();
+                    antialias
+                        .visit(buffer, pixel, |number, weight| mean.add(&antialias.pixels[number], weight));
+                }
             },
         );
         counts

@@ -6,7 +6,7 @@ use crate::accel::Displaced;
 use crate::frame::{Aov, Frame, FrameKind, FrameStats, Matte, RayCounts, SurfaceSample, Window};
 use crate::infer::BuzzBuffer;
 use crate::scene::{Scene, View};
-use crate::trace::{Eye, Shader, Tracer};
+use crate::trace::{Eye, Radiance, SHADED_AT_ONCE, Shader, Tracer};
 use glam::{DVec3, DVec4, Vec3, Vec4};
 use rayon::iter::Either;
 use rayon::prelude::*;
@@ -138,18 +138,37 @@ impl Resolver<'_> {
 
     fn shade(&self, buffer: &BuzzBuffer, frame: &mut Frame) -> RayCounts {
         let shader = || self.tracer.shader();
-        self.fill_rows(frame, buffer.width(), shader, |shader, i, counts| {
-            self.pixel(shader, &self.eye, (&buffer.sample(i), buffer.lit(i)), counts)
+        self.fill_rows(frame, buffer.width(), shader, |shader, first, pixels, counts| {
+            self.shade_pixels(shader, buffer, first, pixels, counts);
         })
     }
 
-    /// Fills the layers that come from shading, row by row; each row has a `state` of its own.
+    /// Shades a few pixels of a buffer, from number `first` on.
+    pub(super) fn shade_pixels(
+        &self,
+        shader: &mut Shader<'_, '_>,
+        buffer: &BuzzBuffer,
+        first: usize,
+        pixels: &mut [Pixel],
+        counts: &mut RayCounts,
+    ) {
+        let mut samples = [SurfaceSample::background(Vec3::ZERO); SHADED_AT_ONCE];
+        let mut lit = [[].as_slice(); SHADED_AT_ONCE];
+        for (k, i) in (first..first + pixels.len()).enumerate() {
+            samples[k] = buffer.sample(i);
+            lit[k] = buffer.lit(i);
+        }
+        self.shade_four(shader, &self.eye, &samples[..pixels.len()], lit, pixels, counts);
+    }
+
+    /// Fills the layers that come from shading, row by row and a few pixels of a row at a time; each row has a `state` of
+    /// its own.
     pub(super) fn fill_rows<S>(
         &self,
         frame: &mut Frame,
         width: usize,
         state: impl Fn() -> S + Sync,
-        value: impl Fn(&mut S, usize, &mut RayCounts) -> Pixel + Sync,
+        values: impl Fn(&mut S, usize, &mut [Pixel], &mut RayCounts) + Sync,
     ) -> RayCounts {
         let fill_row = |y: usize, row: Row<'_>| {
             let mut counts = RayCounts::default();
@@ -157,17 +176,18 @@ impl Resolver<'_> {
                 return counts;
             }
             let mut state = state();
-            for (x, color) in row.color.iter_mut().enumerate() {
-                let pixel = value(&mut state, y * width + x, &mut counts);
-                *color = pixel.color;
+            let mut pixels = [Pixel::default(); SHADED_AT_ONCE];
+            for (k, color) in row.color.chunks_mut(SHADED_AT_ONCE).enumerate() {
+                let (x, pixels) = (k * SHADED_AT_ONCE, &mut pixels[..color.len()]);
+                values(&mut state, y * width + x, pixels, &mut counts);
+                color.iter_mut().zip(&*pixels).for_each(|(texel, pixel)| *texel = pixel.color);
                 for (layer, value) in [
-                    (&mut *row.diffuse, pixel.diffuse),
-                    (&mut *row.specular, pixel.specular),
-                    (&mut *row.emission, pixel.emission),
+                    (&mut *row.diffuse, (|pixel| pixel.diffuse) as fn(&Pixel) -> Vec3),
+                    (&mut *row.specular, |pixel| pixel.specular),
+                    (&mut *row.emission, |pixel| pixel.emission),
                 ] {
-                    if let Some(texel) = layer.get_mut(x) {
-                        *texel = value.to_array();
-                    }
+                    let layer = layer.iter_mut().skip(x);
+                    layer.zip(&*pixels).for_each(|(texel, pixel)| *texel = value(pixel).to_array());
                 }
             }
             counts
@@ -175,34 +195,29 @@ impl Resolver<'_> {
         rows(frame, width).enumerate().map(|(y, row)| fill_row(y, row)).sum()
     }
 
-    /// Shades a sample, under its shadow bits, of a pixel or sub-pixel as wide as `eye` has them, unless the user asked to stop.
-    pub(super) fn shade_sample(
+    /// Shades samples, under their shadow bits, of pixels or sub-pixels as wide as `eye` has them.
+    pub(super) fn shade_four(
         &self,
         shader: &mut Shader<'_, '_>,
         eye: &Eye,
-        seen: (&SurfaceSample, &[u32]),
-        pixel: &mut Pixel,
-    ) -> RayCounts {
-        let mut counts = RayCounts::default();
-        if self.observer.stop_requested().is_none() {
-            *pixel = self.pixel(shader, eye, seen, &mut counts);
+        samples: &[SurfaceSample],
+        lit: [&[u32]; SHADED_AT_ONCE],
+        pixels: &mut [Pixel],
+        counts: &mut RayCounts,
+    ) {
+        let mut radiance = Default::default();
+        shader.shade_four(eye, samples, lit, counts, &mut radiance);
+        for ((pixel, sample), radiance) in pixels.iter_mut().zip(samples).zip(&radiance) {
+            *pixel = self.pixel(sample, radiance);
         }
-        counts
     }
 
-    fn pixel(
-        &self,
-        shader: &mut Shader<'_, '_>,
-        eye: &Eye,
-        (sample, lit): (&SurfaceSample, &[u32]),
-        counts: &mut RayCounts,
-    ) -> Pixel {
-        let radiance = shader.shade(eye, sample, lit, counts);
-        let (diffuse, specular, emission) =
-            (radiance.diffuse * self.gain, radiance.specular * self.gain, radiance.emission * self.gain);
+    fn pixel(&self, sample: &SurfaceSample, radiance: &Radiance) -> Pixel {
         if sample.surface.is_background() && self.settings.transparent {
             return Pixel::default();
         }
+        let (diffuse, specular, emission) =
+            (radiance.diffuse * self.gain, radiance.specular * self.gain, radiance.emission * self.gain);
         let rgb = diffuse + specular + emission;
         Pixel { color: rgb.extend(radiance.alpha).to_array(), diffuse, specular, emission }
     }

@@ -1,19 +1,17 @@
 //! Lights without size (pbrt's delta lights), four at a time. They bring what [`Emitter::unshadowed`] says, but for
 //! rounding: nearly all lights of most scenes are such, and every point asks all of them.
 
-use super::lanes::{LANES, Lanes, Vec3x4};
+use super::lanes::{LANES, Vec3x4};
 use super::light::{Cone, Emitter, MIN_DISTANCE, Shape};
 use super::visibility::Field;
-use glam::{Mat4, Vec3, Vec4};
+use glam::{Vec3, Vec4};
+use std::array;
 
-/// Four lights whose shadow bits stand side by side.
+/// Lights without size, one to a lane: four of them, or the same in all lanes, for four points.
 #[derive(Debug, Clone)]
 pub(super) struct DeltaLights {
     /// The light of each lane.
     numbers: [usize; LANES],
-    /// The word that holds the shadow bits, and where they start in it.
-    word: usize,
-    shift: usize,
     /// Positions; of directional lights, directions to them.
     places: Vec3x4,
     /// -1 for a light that stands at a position, 0 for a directional one.
@@ -26,17 +24,17 @@ pub(super) struct DeltaLights {
     cone_offsets: Vec4,
     /// The largest channel of each light's intensity, W/sr or W/m2; 0 in a lane without a light.
     intensities: Vec4,
-    /// In each column, a light's colour for an intensity of 1.
-    colors: Mat4,
+    /// Each light's colour for an intensity of 1.
+    pub colors: Vec3x4,
 }
 
-/// What four lights bring to a surface where nothing stands in their way.
+/// What lights bring to surfaces where nothing stands in their way, lane by lane.
 pub(super) struct Unshadowed4 {
     /// Irradiance in the largest channel, W/m2, Lambert's cosine included; 0 where nothing arrives.
     pub strengths: Vec4,
     /// Unit directions to the lights.
     pub to_lights: Vec3x4,
-    /// Their cosines to the normal.
+    /// Their cosines to the normals.
     pub cosines: Vec4,
 }
 
@@ -84,45 +82,42 @@ pub(super) fn is_delta(light: &Emitter, field: Field) -> bool {
     !light.has_size() && !field.is_share()
 }
 
+/// Those of `lights` that have no size, with their numbers.
+fn delta<'l>(lights: &'l [Emitter], fields: &[Field]) -> impl Iterator<Item = (usize, &'l Emitter)> {
+    let all = lights.iter().enumerate().zip(fields);
+    all.filter(|&((_, light), &field)| is_delta(light, field)).map(|(light, _)| light)
+}
+
 impl DeltaLights {
-    /// Those of `lights` that have no size, by the places of their shadow bits.
+    /// Those of `lights` that have no size, four at a time.
     pub fn groups(lights: &[Emitter], fields: &[Field]) -> Vec<Self> {
-        let mut groups: Vec<(usize, usize, [Lane; LANES])> = Vec::new();
-        for (number, (light, &field)) in lights.iter().zip(fields).enumerate() {
-            if !is_delta(light, field) {
-                continue;
-            }
-            let (word, bits) = field.bits_at();
-            let bit = bits.trailing_zeros() as usize;
-            let shift = bit - bit % LANES;
-            let at = groups.iter().position(|&(w, s, _)| (w, s) == (word, shift)).unwrap_or_else(|| {
-                groups.push((word, shift, [Lane::EMPTY; LANES]));
-                groups.len() - 1
-            });
-            groups[at].2[bit % LANES] = Lane::of(number, light);
-        }
-        groups.into_iter().map(|(word, shift, lanes)| Self::new(word, shift, lanes)).collect()
+        let delta: Vec<_> = delta(lights, fields).map(|(number, light)| Lane::of(number, light)).collect();
+        let lanes = |group: &[Lane]| array::from_fn(|lane| group.get(lane).copied().unwrap_or(Lane::EMPTY));
+        delta.chunks(LANES).map(|group| Self::new(lanes(group))).collect()
     }
 
-    fn new(word: usize, shift: usize, lanes: [Lane; LANES]) -> Self {
+    /// Each of `lights` that has no size by itself, in all lanes, with the field of its shadow bit.
+    pub fn singles(lights: &[Emitter], fields: &[Field]) -> Vec<(Field, Self)> {
+        let single = |(number, light)| (fields[number], Self::new([Lane::of(number, light); LANES]));
+        delta(lights, fields).map(single).collect()
+    }
+
+    fn new(lanes: [Lane; LANES]) -> Self {
         let each = |value: fn(&Lane) -> f32| Vec4::from_array(lanes.each_ref().map(value));
         let color = |lane: Lane| match lane.intensity.max_element() {
-            most if most > 0.0 => (lane.intensity / most).extend(0.0),
-            _ => Vec4::ZERO,
+            most if most > 0.0 => lane.intensity / most,
+            _ => Vec3::ZERO,
         };
-        let [a, b, c, d] = lanes.map(color);
         Self {
             numbers: lanes.map(|lane| lane.number),
-            word,
-            shift,
-            places: Vec3x4::new(lanes.map(|lane| lane.place)),
+            places: Vec3x4::of(|lane| lanes[lane].place),
             stands: each(|lane| lane.stands),
             per_range2: each(|lane| lane.per_range * lane.per_range),
-            cone_axes: Vec3x4::new(lanes.map(|lane| -lane.cone.direction)),
+            cone_axes: Vec3x4::of(|lane| -lanes[lane].cone.direction),
             cone_scales: each(|lane| lane.cone.scale),
             cone_offsets: each(|lane| lane.cone.offset),
             intensities: each(|lane| lane.intensity.max_element().max(0.0)),
-            colors: Mat4::from_cols(a, b, c, d),
+            colors: Vec3x4::of(|lane| color(lanes[lane])),
         }
     }
 
@@ -131,16 +126,10 @@ impl DeltaLights {
         self.numbers[lane]
     }
 
-    /// The lights that reach a sample, as its shadow words say.
+    /// What the lights bring to surfaces at `points` with unit `normals`.
     #[inline]
-    pub fn lit(&self, words: &[u32]) -> Lanes {
-        Lanes::from_bits(words.get(self.word).map_or(0, |word| word >> self.shift))
-    }
-
-    /// What the lights bring to a surface at `point` with unit `normal`.
-    #[inline]
-    pub fn unshadowed(&self, point: Vec3, normal: Vec3) -> Unshadowed4 {
-        let along = Vec3x4::splat(point) * self.stands + self.places;
+    pub fn unshadowed(&self, points: Vec3x4, normals: Vec3x4) -> Unshadowed4 {
+        let along = points * self.stands + self.places;
         let square = along.length_squared();
         let per_distance = Vec4::ONE / square.sqrt();
         let to_lights = along * per_distance;
@@ -149,17 +138,11 @@ impl DeltaLights {
         let window = (Vec4::ONE - relative * relative).clamp(Vec4::ZERO, Vec4::ONE);
         let cone = to_lights.dot(self.cone_axes) * self.cone_scales + self.cone_offsets;
         let cone = cone.clamp(Vec4::ZERO, Vec4::ONE);
-        let cosines = to_lights.dot(Vec3x4::splat(normal));
+        let cosines = to_lights.dot(normals);
         let strengths = self.intensities * (near * near) * window * (cone * cone) * cosines;
         // A light that stands on the point itself has no direction: NaN, which is not above 0.
         let strengths = Vec4::select(strengths.cmpgt(Vec4::ZERO), strengths, Vec4::ZERO);
         Unshadowed4 { strengths, to_lights, cosines }
-    }
-
-    /// The sum of the lights' colours, each times its strength.
-    #[inline]
-    pub fn sum(&self, strengths: Vec4) -> Vec3 {
-        (self.colors * strengths).truncate()
     }
 }
 
@@ -201,8 +184,6 @@ mod tests {
     #[test]
     fn four_lights_bring_what_each_of_them_brings() {
         let (lights, layout, groups) = prepared();
-        let mut words = vec![0; layout.words];
-        layout.lights.iter().for_each(|field| field.set(&mut words, 1.0));
         let mut shining = 0;
         for i in 0..1000u32 {
             let part = |step: u32| (i * step % 97) as f32 / 48.5 - 1.0;
@@ -210,8 +191,9 @@ mod tests {
             let normal = Vec3::new(part(17), part(23), 0.5).normalize();
             let mut sum = Vec3::ZERO;
             for group in &groups {
-                let Unshadowed4 { strengths, .. } = group.unshadowed(point, normal);
-                sum += group.sum(group.lit(&words).select(strengths));
+                let Unshadowed4 { strengths, .. } =
+                    group.unshadowed(Vec3x4::splat(point), Vec3x4::splat(normal));
+                sum += (group.colors * strengths).sum();
             }
             let delta = lights.iter().zip(&layout.lights).filter(|&(light, &field)| is_delta(light, field));
             let each = delta.filter_map(|(light, _)| light.unshadowed(point, normal));
@@ -226,7 +208,8 @@ mod tests {
     fn a_light_on_the_point_itself_brings_nothing() {
         let (lights, _, groups) = prepared();
         let Way::From(place, _) = lights[0].way(false) else { panic!("a point light") };
-        let Unshadowed4 { strengths, .. } = groups[0].unshadowed(place, Vec3::X);
+        let Unshadowed4 { strengths, .. } =
+            groups[0].unshadowed(Vec3x4::splat(place), Vec3x4::splat(Vec3::X));
         assert!(strengths.x == 0.0 && strengths.w > 0.0, "{strengths}");
     }
 }

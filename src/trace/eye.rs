@@ -1,9 +1,10 @@
 //! What of a view is the same for every pixel, worked out once: its ray, its beam.
 
 use super::interaction::Beam;
+use super::lanes::Vec3x4;
 use crate::accel::{Accel, Ray};
 use crate::scene::View;
-use glam::{DVec2, Vec3};
+use glam::{DVec2, Vec3, Vec4};
 
 /// The eye of a view in render space.
 #[derive(Debug, Clone, Copy)]
@@ -50,11 +51,24 @@ impl Eye {
 
     /// Unit direction from `point` to the eye, and the pixel's beam there.
     pub(super) fn seen_from(&self, point: Vec3) -> (Vec3, Beam) {
+        let (toward, widths) = self.seen_from_four(Vec3x4::splat(point));
+        (toward.lane(0), Beam { width: widths.x, spread: self.spread() })
+    }
+
+    /// Unit directions from four points to the eye, and how wide the pixel's beam is there.
+    #[inline]
+    pub(super) fn seen_from_four(&self, points: Vec3x4) -> (Vec3x4, Vec4) {
+        let forward = Vec3x4::splat(self.forward);
         if !self.perspective {
-            return (-self.forward, Beam { width: self.pixel, spread: 0.0 });
+            return (-forward, Vec4::splat(self.pixel));
         }
-        let along = point - self.position;
-        let depth = along.dot(self.forward).abs();
-        (-along.normalize_or(self.forward), Beam { width: self.pixel * depth, spread: self.pixel })
+        let along = points - Vec3x4::splat(self.position);
+        (-along.normalize_or(forward), along.dot(forward).abs() * self.pixel)
+    }
+
+    /// How much wider a pixel's beam becomes by the metre.
+    #[inline]
+    pub(super) fn spread(&self) -> f32 {
+        if self.perspective { self.pixel } else { 0.0 }
     }
 }

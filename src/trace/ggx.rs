@@ -2,7 +2,7 @@
 
 use super::lanes::{Lanes, Vec3x4};
 use glam::{Vec2, Vec3, Vec4, Vec4Swizzles};
-use std::f32::consts::PI;
+use std::f32::consts::{FRAC_1_PI, PI};
 
 /// Schlick's Fresnel term.
 #[inline]
@@ -48,33 +48,33 @@ pub(super) fn density(nh2: f32, a2: f32) -> f32 {
     a2 / (PI * d * d)
 }
 
-/// BRDF without its Fresnel term for four lights, given as unit directions and their cosines to the normal, and the
-/// cosines between view and half vector that the term needs. 0 in lanes that are not `asked` for or have less than `min`
-/// of density; `None` where all are.
+/// BRDF without its Fresnel term for four pairs of a light and a point, given as unit directions to the lights with their
+/// cosines to the normals, and the cosines between view and half vector that the term needs. 0 in lanes that are not
+/// `asked` for or have less than `min` of density; `None` where all are.
 #[inline]
 pub(super) fn lobes(
-    normal: Vec3,
-    view: Vec3,
+    normals: Vec3x4,
+    views: Vec3x4,
     (to_lights, cosines): (Vec3x4, Vec4),
-    alpha: f32,
+    alpha: Vec4,
     min: f32,
     asked: Lanes,
 ) -> Option<(Vec4, Vec4)> {
-    let half = to_lights + Vec3x4::splat(view);
+    let half = to_lights + views;
     let square = half.length_squared();
-    let nv = normal.dot(view);
-    let along = (cosines + Vec4::splat(nv)).max(Vec4::ZERO);
+    let nv = normals.dot(views);
+    let along = (cosines + nv).max(Vec4::ZERO);
     let a2 = alpha * alpha;
     // Opposite directions have no half vector: NaN, which `min` gives back only as its second argument.
     let d = Vec4::ONE.min(along * along / square) * (a2 - 1.0) + Vec4::ONE;
-    let density = Vec4::splat(a2 / PI) / (d * d);
+    let density = a2 * FRAC_1_PI / (d * d);
     let counted = Lanes::above_zero(asked.select(density) - Vec4::splat(min));
     if counted.is_empty() {
         return None;
     }
     let nl = cosines.clamp(Vec4::ZERO, Vec4::ONE);
-    let nv = nv.abs().max(1e-4);
-    let masked = (nl * nl * (1.0 - a2) + Vec4::splat(a2)).sqrt();
+    let nv = nv.abs().max(Vec4::splat(1e-4));
+    let masked = (nl * nl * (1.0 - a2) + a2).sqrt();
     let shadowing = nl * (nv * nv * (1.0 - a2) + a2).sqrt() + nv * masked;
     let lobes = density * 0.5 / shadowing.max(Vec4::splat(1e-6));
     // Half of the half vector's length: both unit vectors lean from it alike.

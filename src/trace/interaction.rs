@@ -3,7 +3,7 @@
 use super::point::SurfacePoint;
 use crate::accel::{Accel, interpolate};
 use crate::scene::{NormalTexture, Scene, TextureRef};
-use glam::{Vec2, Vec3, Vec3A};
+use glam::{Vec2, Vec3, Vec3A, Vec4};
 
 /// A shading normal is never nearer to the surface than this cosine.
 const MIN_NORMAL_COSINE: f32 = 0.01;
@@ -22,6 +22,13 @@ impl Beam {
     pub fn after(self, distance: f32) -> Self {
         Self { width: self.width + self.spread * distance, spread: self.spread }
     }
+}
+
+/// Sides of the squares over which textures are averaged, for beams so wide that meet surfaces at so steep an angle.
+#[inline]
+pub(super) fn footprints(widths: Vec4, cosines: Vec4) -> Vec4 {
+    // Seen at a slant, the footprint is an ellipse; a square of the same area stands for it.
+    widths / cosines.abs().max(Vec4::splat(0.05)).sqrt()
 }
 
 /// A point on a surface with what its textures say, in render space.
@@ -48,47 +55,38 @@ struct TextureCoordinates {
 }
 
 impl<'a> SurfaceInteraction<'a> {
-    /// The record of `point`; `view` is the unit direction to the eye, which decides how far a slanted footprint reaches.
-    /// Texture coordinates are found only if the material `is_textured`.
+    /// The record of `point` before anything is looked up.
     #[inline]
-    pub fn new(
-        scene: &'a Scene,
-        accel: &'a Accel,
-        point: &'a SurfacePoint<'a>,
-        is_textured: bool,
-        view: Vec3,
-        beam: Beam,
-    ) -> Self {
-        let (mesh, surface) = (point.mesh, point.surface);
-        let normal = point.geometric;
-        let mut this = Self { scene, point, normal, footprint: 0.0, uv: TextureCoordinates::default() };
+    pub fn geometric(scene: &'a Scene, point: &'a SurfacePoint<'a>) -> Self {
+        Self { scene, point, normal: point.geometric, footprint: 0.0, uv: TextureCoordinates::default() }
+    }
+
+    /// Finds the shading normal and the texture coordinates; those only if the material `is_textured`.
+    #[inline]
+    pub fn look_up(&mut self, accel: &Accel, is_textured: bool, footprint: f32) {
+        let SurfacePoint { mesh, surface, placement, corners, weights, .. } = *self.point;
         if is_textured {
-            // Seen at a slant, the footprint is an ellipse; a square of the same area stands for it.
-            let slant = normal.dot(view).abs().max(0.05);
-            this.footprint = beam.width / slant.sqrt();
-            this.uv = this.coordinates(0);
+            self.footprint = footprint;
+            self.uv = self.coordinates(0);
         }
         let index = surface.instance as usize;
-        let placement = this.point.placement;
-        let corners = this.point.corners;
         let normals = accel.normals(index, mesh);
         if !normals.is_empty() {
             let [a, b, c] = corners.map(|i| Vec3A::from(normals[i]));
             let normal = placement.normals * interpolate(a, b, c, surface);
-            this.normal = this.facing(Vec3::from(normal).normalize_or(this.point.geometric));
+            self.normal = self.facing(Vec3::from(normal).normalize_or(self.point.geometric));
         }
-        if let Some(map) = &this.point.material.normal_texture {
+        if let Some(map) = &self.point.material.normal_texture {
             let tangents = accel.tangents(index, mesh);
             let tangent = (!tangents.is_empty()).then(|| {
                 let [a, b, c] = corners.map(|i| tangents[i]);
-                let [wa, wb, wc] = this.point.weights;
+                let [wa, wb, wc] = weights;
                 let t = a * wa + b * wb + c * wc;
                 let m = &placement.render_from_object;
                 (Vec3::from(m.transform_vector3a(Vec3A::from_vec4(t))), t.w * placement.winding)
             });
-            this.normal = this.mapped(map, tangent);
+            self.normal = self.mapped(map, tangent);
         }
-        this
     }
 
     /// `normal` turned to the side that is seen. Vertex normals that point into the surface are taken as meant for
@@ -147,7 +145,7 @@ impl<'a> SurfaceInteraction<'a> {
     }
 
     /// The texture at this point, averaged over its footprint.
-    pub fn texture(&self, texture: &TextureRef) -> glam::Vec4 {
+    pub fn texture(&self, texture: &TextureRef) -> Vec4 {
         let TextureCoordinates { uv, density, .. } = self.coordinates_of(texture.uv_set);
         let scale = texture.transform.matrix2.determinant().abs();
         let scale = if scale == 1.0 { 1.0 } else { scale.sqrt() };
@@ -156,9 +154,9 @@ impl<'a> SurfaceInteraction<'a> {
     }
 
     /// The interpolated vertex colour; white where the mesh has none.
-    pub fn vertex_color(&self) -> glam::Vec4 {
+    pub fn vertex_color(&self) -> Vec4 {
         if self.point.mesh.colors.is_empty() {
-            return glam::Vec4::ONE;
+            return Vec4::ONE;
         }
         let [a, b, c] = self.point.corners.map(|i| self.point.mesh.colors[i]);
         a * self.point.weights[0] + b * self.point.weights[1] + c * self.point.weights[2]

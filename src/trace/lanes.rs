@@ -1,13 +1,14 @@
-//! Vectors four at a time, one to a lane: what is worked out for four lights costs little more than for one.
+//! Vectors four at a time, one to a lane: what is worked out for four lights, or four points, costs little more than for
+//! one.
 
 use glam::{BVec4A, Vec3, Vec4};
-use std::ops::{Add, Mul};
+use std::ops::{Add, AddAssign, BitAnd, BitOr, Mul, Neg, Sub};
 
 /// How many.
 pub(super) const LANES: usize = 4;
 
 /// Four vectors, structure of arrays.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Vec3x4 {
     x: Vec4,
     y: Vec4,
@@ -16,9 +17,14 @@ pub(super) struct Vec3x4 {
 
 impl Vec3x4 {
     /// A vector to each lane.
-    pub fn new(lanes: [Vec3; LANES]) -> Self {
-        let each = |coordinate: fn(Vec3) -> f32| Vec4::from_array(lanes.map(coordinate));
-        Self { x: each(|v| v.x), y: each(|v| v.y), z: each(|v| v.z) }
+    #[inline]
+    pub fn of(vector: impl Fn(usize) -> Vec3) -> Self {
+        let (a, b, c, d) = (vector(0), vector(1), vector(2), vector(3));
+        Self {
+            x: Vec4::new(a.x, b.x, c.x, d.x),
+            y: Vec4::new(a.y, b.y, c.y, d.y),
+            z: Vec4::new(a.z, b.z, c.z, d.z),
+        }
     }
 
     /// The same vector in all lanes.
@@ -38,6 +44,32 @@ impl Vec3x4 {
     pub fn length_squared(self) -> Vec4 {
         self.dot(self)
     }
+
+    /// Each one made as long as 1; those that have no direction become `fallback`.
+    #[inline]
+    pub fn normalize_or(self, fallback: Self) -> Self {
+        let per_length = Vec4::ONE / self.length_squared().sqrt();
+        let regular = per_length.cmpgt(Vec4::ZERO) & per_length.cmplt(Vec4::INFINITY);
+        let Self { x, y, z } = self * per_length;
+        Self {
+            x: Vec4::select(regular, x, fallback.x),
+            y: Vec4::select(regular, y, fallback.y),
+            z: Vec4::select(regular, z, fallback.z),
+        }
+    }
+
+    /// The vector of a lane.
+    #[inline]
+    pub fn lane(self, lane: usize) -> Vec3 {
+        Vec3::new(self.x[lane], self.y[lane], self.z[lane])
+    }
+
+    /// The sum of all four.
+    #[inline]
+    pub fn sum(self) -> Vec3 {
+        let Self { x, y, z } = self;
+        Vec3::new(x.element_sum(), y.element_sum(), z.element_sum())
+    }
 }
 
 impl Add for Vec3x4 {
@@ -46,6 +78,41 @@ impl Add for Vec3x4 {
     #[inline]
     fn add(self, other: Self) -> Self {
         Self { x: self.x + other.x, y: self.y + other.y, z: self.z + other.z }
+    }
+}
+
+impl AddAssign for Vec3x4 {
+    #[inline]
+    fn add_assign(&mut self, other: Self) {
+        *self = *self + other;
+    }
+}
+
+impl Sub for Vec3x4 {
+    type Output = Self;
+
+    #[inline]
+    fn sub(self, other: Self) -> Self {
+        Self { x: self.x - other.x, y: self.y - other.y, z: self.z - other.z }
+    }
+}
+
+impl Neg for Vec3x4 {
+    type Output = Self;
+
+    #[inline]
+    fn neg(self) -> Self {
+        Self { x: -self.x, y: -self.y, z: -self.z }
+    }
+}
+
+/// Each times its own other one, coordinate by coordinate, as light times a reflectance.
+impl Mul for Vec3x4 {
+    type Output = Self;
+
+    #[inline]
+    fn mul(self, other: Self) -> Self {
+        Self { x: self.x * other.x, y: self.y * other.y, z: self.z * other.z }
     }
 }
 
@@ -63,6 +130,7 @@ impl Mul<Vec4> for Vec3x4 {
 pub(super) struct Lanes(BVec4A);
 
 impl Lanes {
+    pub const NONE: Self = Self(BVec4A::FALSE);
     pub const ALL: Self = Self(BVec4A::TRUE);
 
     /// Those whose bits are set among the lowest.
@@ -70,6 +138,12 @@ impl Lanes {
     pub fn from_bits(bits: u32) -> Self {
         const MASKS: [BVec4A; 1 << LANES] = masks();
         Self(MASKS[bits as usize % MASKS.len()])
+    }
+
+    /// Those for which it `is` so.
+    #[inline]
+    pub fn of(is: impl Fn(usize) -> bool) -> Self {
+        Self::from_bits((0..LANES).fold(0, |bits, lane| bits | u32::from(is(lane)) << lane))
     }
 
     /// Those in which `values` are above 0.
@@ -98,7 +172,31 @@ impl Lanes {
     /// `values` in these lanes, 0 in the others.
     #[inline]
     pub fn select(self, values: Vec4) -> Vec4 {
-        Vec4::select(self.0, values, Vec4::ZERO)
+        self.choose(values, Vec4::ZERO)
+    }
+
+    /// `values` in these lanes, `others` in the others.
+    #[inline]
+    pub fn choose(self, values: Vec4, others: Vec4) -> Vec4 {
+        Vec4::select(self.0, values, others)
+    }
+}
+
+impl BitAnd for Lanes {
+    type Output = Self;
+
+    #[inline]
+    fn bitand(self, other: Self) -> Self {
+        Self(self.0 & other.0)
+    }
+}
+
+impl BitOr for Lanes {
+    type Output = Self;
+
+    #[inline]
+    fn bitor(self, other: Self) -> Self {
+        Self(self.0 | other.0)
     }
 }
 

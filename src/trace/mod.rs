@@ -18,6 +18,7 @@ mod lanes;
 mod light;
 mod point;
 mod reach;
+mod receivers;
 mod sequence;
 mod shader;
 mod surface;
@@ -31,12 +32,12 @@ use crate::scene::{Pose, Scene, View};
 pub use changes::LightChanges;
 use delta_lights::{DeltaLights, is_delta};
 pub use eye::Eye;
-use glam::Vec3;
-use interaction::{Beam, SurfaceInteraction};
+use glam::{Vec3, Vec4};
+use interaction::{Beam, SurfaceInteraction, footprints};
 use light::Emitter;
 use point::{Side, SurfacePoint};
-pub use shader::Shader;
 use shader::finite;
+pub use shader::{SHADED_AT_ONCE, Shader};
 use std::f32::consts::FRAC_1_PI;
 use surface::{ShadingMaterial, Surface, occlusion};
 use visibility::{Field, Inquiry, Layout};
@@ -89,8 +90,10 @@ pub struct Tracer<'a> {
     accel: &'a Accel,
     options: TraceOptions,
     lights: Vec<Emitter>,
-    /// Those of them that never have a size.
+    /// Those of them that never have a size, four at a time.
     delta_lights: Vec<DeltaLights>,
+    /// The same one by one, each for four points.
+    single_lights: Vec<(Field, DeltaLights)>,
     /// The numbers of the others: those that have a size, now or at some time.
     sized_lights: Vec<usize>,
     layout: Layout,
@@ -109,6 +112,7 @@ impl<'a> Tracer<'a> {
             accel,
             options,
             delta_lights: DeltaLights::groups(&lights, &layout.lights),
+            single_lights: DeltaLights::singles(&lights, &layout.lights),
             sized_lights: (0..lights.len()).filter(|&n| !is_delta(&lights[n], layout.lights[n])).collect(),
             lights,
             layout,
@@ -322,13 +326,25 @@ impl<'a> Tracer<'a> {
         toward: Vec3,
         beam: Beam,
     ) -> SurfaceInteraction<'b> {
-        let is_textured = self.materials[point.mesh.material].is_textured;
-        SurfaceInteraction::new(self.scene, self.accel, point, is_textured, toward, beam)
+        let mut it = SurfaceInteraction::geometric(self.scene, point);
+        let cosine = point.geometric.dot(toward);
+        self.look_up(&mut it, footprints(Vec4::splat(beam.width), Vec4::splat(cosine)).x);
+        it
+    }
+
+    /// Finds what is known at a point besides its geometry.
+    #[inline]
+    fn look_up(&self, it: &mut SurfaceInteraction, footprint: f32) {
+        it.look_up(self.accel, self.material(it).is_textured, footprint);
     }
 
     /// What the material says at a point; `room` holds what is not the same everywhere.
     fn surface<'b>(&'b self, it: &SurfaceInteraction, room: &'b mut Option<Surface>) -> &'b Surface {
-        self.materials[it.point.mesh.material].surface(it, room)
+        self.material(it).surface(it, room)
+    }
+
+    fn material(&self, it: &SurfaceInteraction) -> &ShadingMaterial {
+        &self.materials[it.point.mesh.material]
     }
 
     /// What arrives from the world, of which `share` reaches the point.

@@ -12,6 +12,7 @@ use std::cell::OnceCell;
 const OFFSET_ROUNDINGS: f32 = 32.0;
 
 /// A point on a surface, in render space.
+#[derive(Clone)]
 pub(super) struct SurfacePoint<'a> {
     pub mesh: &'a Mesh,
     pub material: &'a Material,
@@ -98,19 +99,17 @@ impl<'a> SurfacePoint<'a> {
         this
     }
 
-    /// Moves to another point of the same triangle; false, and nowhere, if `surface` is not on it. It is then what
-    /// [`SurfacePoint::new`] gives, for less work.
-    pub fn move_to(&mut self, surface: SurfaceRef, side: Side) -> bool {
+    /// Whether `surface` is on the same triangle, so that [`SurfacePoint::place`] will do.
+    #[inline]
+    pub fn shares_triangle(&self, surface: SurfaceRef) -> bool {
         let primitive = |s: &SurfaceRef| (s.instance, s.primitive);
-        let stays = primitive(&surface) == primitive(&self.surface) && self.mesh.shape.is_none();
-        if stays {
-            self.offset = OnceCell::new();
-            self.place(surface, side);
-        }
-        stays
+        primitive(&surface) == primitive(&self.surface) && self.mesh.shape.is_none()
     }
 
-    fn place(&mut self, surface: SurfaceRef, side: Side) {
+    /// Moves to another point of the same triangle. It is then what [`SurfacePoint::new`] gives, for less work. Points of shapes
+    /// stay where they are.
+    #[inline]
+    pub fn place(&mut self, surface: SurfaceRef, side: Side) {
         let [a, b, c] = self.positions;
         let mut local = a;
         if self.mesh.shape.is_none() {
@@ -121,6 +120,7 @@ impl<'a> SurfacePoint<'a> {
         self.front = side.is_front(self.outward);
         self.geometric = if self.front { self.outward } else { -self.outward };
         self.surface = surface;
+        self.offset = OnceCell::new();
     }
 
     /// A number that says nothing but which point this is: what is left to chance here is decided by it, and so the

@@ -1,6 +1,6 @@
 //! What a material says at a point: the inputs of the shading model, textures applied.
 
-use super::ggx::{dielectric, schlick, schlick_weights};
+use super::ggx::{dielectric, schlick};
 use super::interaction::SurfaceInteraction;
 use crate::scene::{AlphaMode, MIRROR_ROUGHNESS, Material, TextureRef};
 use glam::{Vec3, Vec4};
@@ -51,10 +51,22 @@ impl ShadingMaterial {
     /// The surface at a point; `room` holds it where it is not the same everywhere.
     #[inline]
     pub fn surface<'a>(&'a self, it: &SurfaceInteraction, room: &'a mut Option<Surface>) -> &'a Surface {
-        if !self.is_textured && it.point.mesh.colors.is_empty() {
-            return &self.plain[usize::from(!it.point.front)];
-        }
-        room.insert(Surface::new(it.point.material, it.point.front, it.vertex_color(), |t| it.texture(t)))
+        *room = self.own_surface(it);
+        room.as_ref().unwrap_or_else(|| self.plain_surface(it.point.front))
+    }
+
+    /// The surface at a point where it is not the same everywhere.
+    #[inline]
+    pub fn own_surface(&self, it: &SurfaceInteraction) -> Option<Surface> {
+        let is_plain = !self.is_textured && it.point.mesh.colors.is_empty();
+        let own = || Surface::new(it.point.material, it.point.front, it.vertex_color(), |t| it.texture(t));
+        (!is_plain).then(own)
+    }
+
+    /// The surface where it is the same everywhere, from the front or from the back.
+    #[inline]
+    pub fn plain_surface(&self, front: bool) -> &Surface {
+        &self.plain[usize::from(!front)]
     }
 }
 
@@ -124,12 +136,12 @@ impl Surface {
         }
     }
 
-    /// The Fresnel term for four cosines, each as a weight between reflectances, which are the same for all.
+    /// The reflectances between which the Fresnel term lies.
     #[inline]
-    pub fn fresnel4(&self, cosines: Vec4) -> (Vec4, [Vec3; 2]) {
+    pub fn reflectances(&self) -> [Vec3; 2] {
         match self.eta {
-            Some(eta) => (cosines.map(|cos| dielectric(cos, eta)), [Vec3::ZERO, Vec3::ONE]),
-            None => (schlick_weights(cosines), [self.f0, Vec3::splat(self.f90)]),
+            Some(_) => [Vec3::ZERO, Vec3::ONE],
+            None => [self.f0, Vec3::splat(self.f90)],
         }
     }
 

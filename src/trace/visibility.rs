@@ -2,6 +2,7 @@
 //! light, and of the world, that reaches the point.
 
 use super::TraceOptions;
+use super::lanes::{LANES, Lanes};
 use crate::scene::Scene;
 use glam::{U8Vec4, Vec3, Vec4};
 
@@ -226,6 +227,13 @@ impl Field {
         self.bits(words) != 0
     }
 
+    /// In which of four samples, given by their words, its bit is set; it must not be a share.
+    #[inline]
+    pub fn lanes(self, words: [&[u32]; LANES]) -> Lanes {
+        Lanes::from_bits((0..LANES).fold(0, |bits, lane| bits | self.bits(words[lane]) << lane))
+    }
+
+    #[inline]
     fn bits(self, words: &[u32]) -> u32 {
         words.get(self.word).map_or(0, |word| word >> self.shift & self.whole)
     }

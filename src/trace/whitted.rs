@@ -1,11 +1,12 @@
 //! What leaves a surface towards the eye, and the rays that have to be followed to know it.
 
-use super::delta_lights::{DeltaLights, Unshadowed4};
+use super::delta_lights::DeltaLights;
 use super::ggx::{density, environment_share, lobes, refract};
 use super::interaction::{Beam, SurfaceInteraction};
 use super::lanes::{Lanes, Vec3x4};
 use super::light::{Emitter, GRID, Unshadowed};
 use super::point::{Side, SurfacePoint};
+use super::receivers::{Brought, Receivers};
 use super::surface::Surface;
 use super::visibility::Inquiry;
 use super::{Radiance, Tracer};
@@ -19,7 +20,7 @@ const MIN_SHARE: f32 = 1.0 / 256.0;
 
 /// A highlight is left out where its lobe has less density than this, 1/sr: but for grazing angles it would add less
 /// than 1e-4 of what a white diffuse surface does.
-const MIN_LOBE: f32 = 1e-4;
+pub(super) const MIN_LOBE: f32 = 1e-4;
 
 /// How a point came to be looked at.
 #[derive(Clone, Copy)]
@@ -87,24 +88,11 @@ impl Incoming {
         asked: Lanes,
         reach: impl FnOnce(Lanes) -> Lanes,
     ) {
-        let Unshadowed4 { strengths, to_lights, cosines } = lights.unshadowed(it.point.position, it.normal);
-        let shining = Lanes::above_zero(asked.select(strengths));
-        let mut mirrored = None;
-        if surface.has_highlights() {
-            mirrored = lobes(it.normal, toward, (to_lights, cosines), surface.alpha, MIN_LOBE, shining);
-        }
-        let seen = match mirrored {
-            _ if surface.albedo != Vec3::ZERO => shining,
-            Some((lobes, _)) => Lanes::above_zero(lobes),
-            None => return,
-        };
-        let light = reach(seen).select(strengths);
-        self.irradiance += lights.sum(light);
-        if let Some((lobes, cosines)) = mirrored {
-            let (grazing, [f0, f90]) = surface.fresnel4(cosines);
-            let (light, grazing) = (light * lobes, light * lobes * grazing);
-            self.highlights += lights.sum(light - grazing) * f0 + lights.sum(grazing) * f90;
-        }
+        let mut brought = Brought::default();
+        let receivers = Receivers::all(it, surface, toward);
+        receivers.add(lights, asked, reach, &mut brought);
+        self.irradiance += brought.irradiance.sum();
+        self.highlights += receivers.highlights(&brought).sum();
     }
 
     /// Adds the `share` of a light that has a size that reaches the point.
@@ -136,7 +124,8 @@ impl Surface {
         }
         let mirrored = |alpha: f32, to_light: Vec3| {
             let lights = (Vec3x4::splat(to_light), Vec4::splat(it.normal.dot(to_light)));
-            match lobes(it.normal, toward, lights, alpha, MIN_LOBE, Lanes::ALL) {
+            let [normal, toward] = [it.normal, toward].map(Vec3x4::splat);
+            match lobes(normal, toward, lights, Vec4::splat(alpha), MIN_LOBE, Lanes::ALL) {
                 Some((lobes, cos)) => unshadowed.irradiance * lobes.x * self.fresnel(cos.x),
                 None => Vec3::ZERO,
             }
@@ -177,6 +166,7 @@ fn may_mirror(normal: Vec3, view: Vec3, light: Vec3, chord: f32, alpha: f32) -> 
 
 impl Tracer<'_> {
     /// What leaves `it` along `toward`, given what arrives there.
+    #[inline]
     pub(super) fn leaving(
         &self,
         it: &SurfaceInteraction,
