@@ -53,14 +53,6 @@ impl Nearby {
     }
 }
 
-/// What shows of one surface around a pixel.
-pub(super) struct Showing {
-    /// Samples that name its triangles, each once.
-    pub triangles: Nearby,
-    /// What was where the centre's point was, if all of it is on the surface.
-    pub cell: Option<Cell>,
-}
-
 /// The samples that landed around a pixel and on it.
 pub(super) struct Around<'a> {
     old: &'a BuzzBuffer,
@@ -112,12 +104,11 @@ impl<'a> Around<'a> {
         !self.moved && !self.suspect && self.is_complete()
     }
 
-    /// What shows here of the surface of old sample `i`: none unless nothing unknown may stand in front, and the pixel's
-    /// centre lies within that surface.
-    pub fn surface_of(&self, i: usize) -> Option<Showing> {
-        let mut triangles = Nearby::NONE;
+    /// Samples that name the triangles of the surface of old sample `i` here, each once, that of `i` first; none unless the
+    /// pixel's centre lies within that surface.
+    pub fn surface_of(&self, i: usize) -> Option<Nearby> {
+        let (mut triangles, mut others) = (Nearby::NONE, Nearby::NONE);
         triangles.push(i);
-        let mut others = Nearby::NONE;
         let tangent = Tangent::new(self.old.sample(i), self.view);
         for k in self.known().filter(|&k| !self.old.is_same_primitive(i, k)) {
             if !tangent.reaches(&self.old.sample(k)) {
@@ -126,23 +117,31 @@ impl<'a> Around<'a> {
                 triangles.push(k);
             }
         }
-        let cell = self.cell_on(&tangent, i, i);
-        let showing = Showing { triangles, cell };
-        (others.count == 0 || cell.is_some() && self.is_before(&tangent, i, &others)).then_some(showing)
+        (others.count == 0 || self.is_inside(&tangent, i, &others)).then_some(triangles)
     }
 
-    /// The cell that has come to the centre as old sample `k` has, if all of it shows the surface of `i`.
-    fn cell_on(&self, tangent: &Tangent<'_>, i: usize, k: usize) -> Option<Cell> {
+    /// The cell that has come to the centre with old sample `i`, if all of it shows the surface of that sample.
+    pub fn cell(&self, i: usize) -> Option<Cell> {
+        self.cell_on(&Tangent::new(self.old.sample(i), self.view), i)
+    }
+
+    fn cell_on(&self, tangent: &Tangent<'_>, i: usize) -> Option<Cell> {
         let is_on = |k: &usize| self.old.is_same_primitive(i, *k) || tangent.reaches(&self.old.sample(*k));
-        Cell::of(self.old, self.view, k, self.pixel).filter(|cell| cell.corners.iter().all(is_on))
+        Cell::of(self.old, self.view, i, self.pixel).filter(|cell| cell.corners.iter().all(is_on))
     }
 
-    /// True if no outline of the `others` passes over the surface of `i` here: outlines move with what is nearer, so what
-    /// was at the place that comes here with each of them must be that surface too, unless they are behind it.
-    fn is_before(&self, tangent: &Tangent<'_>, i: usize, others: &Nearby) -> bool {
+    /// True if no outline between the surface of `i` and `others` passes here. Outlines move with what is nearer: so that must
+    /// be this surface, and what has come here with it must be between four old pixels that all show it.
+    fn is_inside(&self, tangent: &Tangent<'_>, i: usize, others: &Nearby) -> bool {
         let depth = |k: usize| self.view.depth(&self.old.sample(k));
         let own = depth(i);
-        others.iter().all(|k| depth(k) > own || self.cell_on(tangent, i, k).is_some())
+        others.iter().all(|k| depth(k) > own) && self.cell_on(tangent, i).is_some()
+    }
+
+    /// True if something landed on all pixels here, with the same shadow bits.
+    pub fn is_lit_alike(&self) -> bool {
+        let first = self.known.pixels[0] as usize;
+        self.is_complete() && self.known().all(|k| self.old.is_lit_alike(first, k))
     }
 
     /// Sets in `ask` the bits of the lights about which the samples around disagree, and clears all others.
@@ -166,19 +165,21 @@ impl<'a> Around<'a> {
         ask: &mut [u32],
     ) -> bool {
         let tangent = Tangent::new(*sample, self.view);
-        let mut lenders = Nearby::NONE;
-        self.known().filter(|&k| tangent.may_lend(&self.old.sample(k))).for_each(|k| lenders.push(k));
-        let Some(first) = lenders.iter().next() else {
+        let lends = |k: &usize| tangent.may_lend(&self.old.sample(*k));
+        let mut known = self.known().filter(lends);
+        let Some(first) = known.next() else {
             ask.fill(u32::MAX);
             return false;
         };
         if believes_cells(trust, rays)
             && let Some(cell) = Cell::of(self.old, self.view, first, self.pixel)
-            && cell.corners.iter().all(|&k| tangent.may_lend(&self.old.sample(k)))
+            && cell.corners.iter().all(lends)
         {
             cell.lend(self.old, rays, lit, ask);
             return true;
         }
+        let mut lenders = Nearby::NONE;
+        std::iter::once(first).chain(known).for_each(|k| lenders.push(k));
         differing(rays, self.old, &lenders, ask);
         lit.copy_from_slice(self.old.lit(first));
         rays.blend(lenders.iter().map(|k| (self.old.lit(k), 1.0)), lit);

@@ -17,7 +17,7 @@
 
 use super::Marks;
 use super::alike::{Alike, AlikeRow};
-use super::around::{Around, Showing, Trust, believes_cells, is_one_surface};
+use super::around::{Around, Trust, believes_cells, is_one_surface};
 use super::buzz_buffer::{BuzzBuffer, CastRays, Projector, Row, UNKNOWN};
 use super::moved::Askers;
 use super::project::Landings;
@@ -119,6 +119,13 @@ pub trait CastCentres: CastRays {
 /// and all around it agree that it is not there. Here it is met sooner or later, and from then on its edges are cast and it
 /// fills its outline, a pixel a frame.
 const LOOKOUT: usize = 16;
+
+/// One pixel in so many where what is seen has come so much nearer that such things grow fast, or does not say: where
+/// nothing landed, and in the background.
+const NEAR_LOOKOUT: usize = 8;
+
+/// The growth in a frame from which that is so.
+const FAST: f32 = 1.03;
 
 /// One pixel in so many, on either axis, has its shares confirmed.
 const RENEWED: usize = 8;
@@ -239,16 +246,17 @@ impl Centring {
                 }
                 let nearby = || around.known().next().filter(|_| around.known().count() >= ENOUGH_TO_FILL);
                 let centred = own.or_else(nearby).and_then(|i| {
-                    let Showing { triangles, cell } = around.surface_of(i)?;
+                    let triangles = around.surface_of(i)?;
                     let candidates = triangles.iter().map(|k| old.sample(k));
                     let sample = rays.nearest_of(x, y, candidates, &mut memory)?;
-                    Some((i, sample, cell))
+                    Some((i, sample))
                 });
-                if let Some((i, sample, cell)) = centred {
+                if let Some((i, sample)) = centred {
                     reuse(i, &sample);
                     // Where it is the very sample that landed here, its lights are known.
-                    if !sources.is_centred(pixel) {
-                        match cell.filter(|_| believes_cells(trust, rays) && (x + y) % 2 == 0) {
+                    if !sources.is_centred(pixel) && !around.is_lit_alike() {
+                        let is_believed = (x + y) % 2 == 0 && believes_cells(trust, rays);
+                        match is_believed.then(|| around.cell(i)).flatten() {
                             Some(cell) => cell.lend(old, rays, row.lit_mut(x), ask),
                             None => {
                                 doubt.fill(u32::MAX);
@@ -293,7 +301,10 @@ impl Centring {
                 let pixel = y * width + x;
                 let [ask, doubt] = [&mut *ask, &mut *doubt].map(|bits| &mut bits[x * words..][..words]);
                 let known = row.object[x] != UNKNOWN;
-                let is_lookout = moves && grid.has((x, y), LOOKOUT);
+                let comes_near = |i: usize| old.z[i] > FAST * row.z[x] || old.z[i].is_infinite();
+                let grows = || sources.of(pixel).is_none_or(comes_near);
+                let is_lookout =
+                    moves && grid.has((x, y), NEAR_LOOKOUT) && (grid.has((x, y), LOOKOUT) || grows());
                 if known
                     && (is_lookout || trust == Trust::Proof)
                     && rays.is_hidden(&row.sample(x), &mut counts)
