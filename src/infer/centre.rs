@@ -369,3 +369,45 @@ impl Centring {
             .sum()
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::{Lens, Projection, View};
+    use glam::{DVec2, DVec3};
+    use std::collections::HashSet;
+
+    fn grid(eye_x: f64) -> Grid {
+        let lens = Lens {
+            projection: Projection::Perspective { yfov: 0.7 },
+            shift: DVec2::ZERO,
+            near: 0.1,
+            far: f64::INFINITY,
+        };
+        let (eye, right, up, forward) = (DVec3::X * eye_x, DVec3::X, DVec3::Y, DVec3::NEG_Z);
+        let view = View { eye, right, up, forward, lens, width: 64, height: 48, pixel_aspect: 1.0 };
+        Grid::of(&Projector::new(&view, DVec3::ZERO))
+    }
+
+    #[test]
+    fn lookouts_stand_elsewhere_in_each_view() {
+        let places: HashSet<_> = (0..400).map(|i| grid(0.001 * f64::from(i)).first).collect();
+        // Of 256 places, 400 draws leave one in five.
+        assert!(places.len() > 180, "{}", places.len());
+        assert!(grid(1.0).first == grid(1.0).first);
+    }
+
+    #[test]
+    fn the_denser_grid_has_the_places_of_the_other() {
+        for i in 0..20 {
+            let grid = grid(f64::from(i));
+            let count = |step| {
+                let pixels = (0..64).flat_map(|x| (0..64).map(move |y| (x, y)));
+                pixels.filter(|&pixel| grid.has(pixel, step)).count()
+            };
+            assert_eq!((count(LOOKOUT), count(NEAR_LOOKOUT)), (16, 64));
+            let both = |x, y| !grid.has((x, y), LOOKOUT) || grid.has((x, y), NEAR_LOOKOUT);
+            assert!((0..64).all(|x| (0..64).all(|y| both(x, y))));
+        }
+    }
+}
