@@ -8,11 +8,13 @@
 //! - Within a surface, where the whole neighbourhood shows it without a step, the centre ray is intersected with the
 //!   triangles that the neighbourhood names, and with nothing else: no ray is cast into the scene. A pixel on which
 //!   nothing landed is filled in the same way.
+//! - So it is inside the outline of what is nearest around, where the four old pixels between which the centre's point was
+//!   ([`Cell`](super::cell::Cell)) all show that.
 //! - Everywhere else a ray is cast, so that an edge moves even if it moves by less than half a pixel a frame.
 //!
 //! Shadow bits are settled light by light. The points around say whether a light reaches the surface here: where they
-//! agree they are believed; where they do not, the shadow's edge is near and a ray is cast to that light alone. The bits
-//! around a wrong bit disagree with it, so an error does not live on. Shares of lights that have a size are carried along
+//! agree they are believed; where they do not, the shadow's edge is near and a ray is cast to that light alone, but for every
+//! other pixel whose cell agrees. The bits around a wrong bit disagree with it, so an error does not live on. Shares of lights that have a size are carried along
 //! with the surface ([`carry`]); where they change fast from point to point, a few rays renew them.
 
 use super::Marks;
@@ -255,6 +257,7 @@ impl Centring {
                     reuse(i, &sample);
                     // Where it is the very sample that landed here, its lights are known.
                     if !sources.is_centred(pixel) && !around.is_lit_alike() {
+                        // On a chess board: what is wrong here is asked beside it.
                         let is_believed = (x + y) % 2 == 0 && believes_cells(trust, rays);
                         match is_believed.then(|| around.cell(i)).flatten() {
                             Some(cell) => cell.lend(old, rays, row.lit_mut(x), ask),

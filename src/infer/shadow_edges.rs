@@ -30,7 +30,7 @@ pub(super) struct ShadowEdges {
 impl ShadowEdges {
     /// Settles the shadow bits of `buffer`, which is complete. `asked` has the bits of the lights that each pixel has
     /// asked already; those that it asks here are added. `doubt` has those about which what is around a pixel may be wrong;
-    /// the bits that change here are added.
+    /// where one changes here, all of the pixel's are added.
     pub fn follow(
         &mut self,
         buffer: &mut BuzzBuffer,
@@ -100,7 +100,7 @@ impl ShadowEdges {
             let i = pixel as usize;
             lit.copy_from_slice(buffer.lit(i));
             let sample = buffer.sample(i);
-            let of = |bits: &'_ [u32], pixel: usize, word: usize| bits[pixel * words + word];
+            let of = |bits: &[u32], pixel: usize, word: usize| bits[pixel * words + word];
             let in_doubt = |other: usize| {
                 (0..words).any(|w| {
                     (of(&buffer.lit, i, w) ^ of(&buffer.lit, other, w))
