@@ -105,8 +105,8 @@ impl<'a> Around<'a> {
     }
 
     /// Samples that name the triangles of the surface of old sample `i` here, each once, that of `i` first; none unless the
-    /// pixel's centre lies within that surface.
-    pub fn surface_of(&self, i: usize) -> Option<Nearby> {
+    /// pixel's centre lies within that surface. Of a surface behind others that may be known only if one `believes` cells.
+    pub fn surface_of(&self, i: usize, believes: bool) -> Option<Nearby> {
         let (mut triangles, mut others) = (Nearby::NONE, Nearby::NONE);
         triangles.push(i);
         let tangent = Tangent::new(self.old.sample(i), self.view);
@@ -117,25 +117,28 @@ impl<'a> Around<'a> {
                 triangles.push(k);
             }
         }
-        (others.count == 0 || self.is_inside(&tangent, i, &others)).then_some(triangles)
+        (others.count == 0 || self.is_inside(&tangent, i, &others, believes)).then_some(triangles)
     }
 
     /// The cell that has come to the centre with old sample `i`, if all of it shows the surface of that sample.
     pub fn cell(&self, i: usize) -> Option<Cell> {
-        self.cell_on(&Tangent::new(self.old.sample(i), self.view), i)
+        self.cell_on((&Tangent::new(self.old.sample(i), self.view), i), i)
     }
 
-    fn cell_on(&self, tangent: &Tangent<'_>, i: usize) -> Option<Cell> {
+    /// The cell that has come to the centre along with old sample `mover`, if all of it shows the surface of `i`.
+    fn cell_on(&self, (tangent, i): (&Tangent<'_>, usize), mover: usize) -> Option<Cell> {
         let is_on = |k: &usize| self.old.is_same_primitive(i, *k) || tangent.reaches(&self.old.sample(*k));
-        Cell::of(self.old, self.view, i, self.pixel).filter(|cell| cell.corners.iter().all(is_on))
+        Cell::of(self.old, self.view, mover, self.pixel).filter(|cell| cell.corners.iter().all(is_on))
     }
 
-    /// True if no outline between the surface of `i` and `others` passes here. Outlines move with what is nearer: so that must
-    /// be this surface, and what has come here with it must be between four old pixels that all show it.
-    fn is_inside(&self, tangent: &Tangent<'_>, i: usize, others: &Nearby) -> bool {
+    /// True if no outline between the surface of `i` and `others` passes here. An outline moves with what is nearer. That is
+    /// this surface, or, if one `believes` cells, others: what has come here with each must be between four old pixels that
+    /// all show this surface.
+    fn is_inside(&self, tangent: &Tangent<'_>, i: usize, others: &Nearby, believes: bool) -> bool {
         let depth = |k: usize| self.view.depth(&self.old.sample(k));
         let own = depth(i);
-        others.iter().all(|k| depth(k) > own) && self.cell_on(tangent, i).is_some()
+        let is_past = |k: usize| believes && self.cell_on((tangent, i), k).is_some();
+        others.iter().all(|k| depth(k) > own || is_past(k)) && self.cell_on((tangent, i), i).is_some()
     }
 
     /// True if something landed on all pixels here, with the same shadow bits.

@@ -247,9 +247,11 @@ impl Centring {
                     reuse(i, &old.sample(i));
                     continue;
                 }
+                // On a chess board: what is wrong here is asked beside it.
+                let is_spared = (x + y) % 2 == 0 && trust == Trust::Neighbours;
                 let nearby = || around.known().next().filter(|_| around.known().count() >= ENOUGH_TO_FILL);
                 let centred = own.or_else(nearby).and_then(|i| {
-                    let triangles = around.surface_of(i)?;
+                    let triangles = around.surface_of(i, is_spared)?;
                     let candidates = triangles.iter().map(|k| old.sample(k));
                     let sample = rays.nearest_of(x, y, candidates, &mut memory)?;
                     Some((i, sample))
@@ -258,8 +260,7 @@ impl Centring {
                     reuse(i, &sample);
                     // Where it is the very sample that landed here, its lights are known.
                     if !sources.is_centred(pixel) && !around.is_lit_alike() {
-                        // On a chess board: what is wrong here is asked beside it.
-                        let is_believed = (x + y) % 2 == 0 && believes_cells(trust, rays);
+                        let is_believed = is_spared && believes_cells(trust, rays);
                         match is_believed.then(|| around.cell(i)).flatten() {
                             Some(cell) => cell.lend(old, rays, row.lit_mut(x), ask),
                             None => {
