@@ -20,8 +20,8 @@ pub(super) const ENOUGH_TO_LEND: usize = 6;
 /// How much is believed without a ray.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Trust {
-    /// Shadow bits on which all that is known around agrees; reused samples before which no line L passes, but for a few
-    /// that a ray proves visible, so that nothing new stays unseen for long.
+    /// Shadow bits on which all that is known around agrees; reused samples beside which no ray met anything unknown, but for
+    /// a few that a ray proves visible, so that nothing new stays unseen for long.
     Neighbours,
     /// Shadow bits on which the whole neighbourhood is known to agree; reused samples that a ray has proven visible.
     Proof,
@@ -105,8 +105,8 @@ impl<'a> Around<'a> {
     }
 
     /// Samples that name the triangles of the surface of old sample `i` here, each once, that of `i` first; none unless the
-    /// pixel's centre lies within that surface. Of a surface behind others that may be known only if one `believes` cells.
-    pub fn surface_of(&self, i: usize, believes: bool) -> Option<Nearby> {
+    /// pixel's centre lies within that surface. Of a surface behind others that is known only if neighbours are trusted.
+    pub fn surface_of(&self, i: usize, trust: Trust) -> Option<Nearby> {
         let (mut triangles, mut others) = (Nearby::NONE, Nearby::NONE);
         triangles.push(i);
         let tangent = Tangent::new(self.old.sample(i), self.view);
@@ -117,7 +117,7 @@ impl<'a> Around<'a> {
                 triangles.push(k);
             }
         }
-        (others.count == 0 || self.is_inside(&tangent, i, &others, believes)).then_some(triangles)
+        (others.count == 0 || self.is_inside(&tangent, i, &others, trust)).then_some(triangles)
     }
 
     /// The cell that has come to the centre with old sample `i`, if all of it shows the surface of that sample.
@@ -132,12 +132,12 @@ impl<'a> Around<'a> {
     }
 
     /// True if no outline between the surface of `i` and `others` passes here. An outline moves with what is nearer. That is
-    /// this surface, or, if one `believes` cells, others: what has come here with each must be between four old pixels that
+    /// this surface, or, if neighbours are trusted, others: what has come here with each must be between four old pixels that
     /// all show this surface.
-    fn is_inside(&self, tangent: &Tangent<'_>, i: usize, others: &Nearby, believes: bool) -> bool {
+    fn is_inside(&self, tangent: &Tangent<'_>, i: usize, others: &Nearby, trust: Trust) -> bool {
         let depth = |k: usize| self.view.depth(&self.old.sample(k));
         let own = depth(i);
-        let is_past = |k: usize| believes && self.cell_on((tangent, i), k).is_some();
+        let is_past = |k: usize| trust == Trust::Neighbours && self.cell_on((tangent, i), k).is_some();
         others.iter().all(|k| depth(k) > own || is_past(k)) && self.cell_on((tangent, i), i).is_some()
     }
 

@@ -9,8 +9,9 @@
 //!   triangles that the neighbourhood names, and with nothing else: no ray is cast into the scene. A pixel on which
 //!   nothing landed is filled in the same way.
 //! - So it is inside the outline of what is nearest around, where the four old pixels between which the centre's point was
-//!   ([`Cell`](super::cell::Cell)) all show that.
-//! - Everywhere else a ray is cast, so that an edge moves even if it moves by less than half a pixel a frame.
+//!   ([`Cell`](super::cell::Cell)) all show that; and behind it, where the cells that came with what is nearer do not.
+//! - Everywhere else a ray is cast, so that an edge moves even if it moves by less than half a pixel a frame. What rays meet
+//!   that nothing around knew of is [followed](super::outlines).
 //!
 //! Shadow bits are settled light by light. The points around say whether a light reaches the surface here: where they
 //! agree they are believed; where they do not, the shadow's edge is near and a ray is cast to that light alone, but for
@@ -20,9 +21,11 @@
 
 use super::Marks;
 use super::alike::{Alike, AlikeRow};
-use super::around::{Around, Trust, believes_cells, is_one_surface};
-use super::buzz_buffer::{BuzzBuffer, CastRays, Projector, Row, UNKNOWN};
-use super::moved::Askers;
+use super::around::{Around, Trust, believes_cells};
+use super::buzz_buffer::{BuzzBuffer, CastRays, Projector, UNKNOWN};
+use super::cast::Pass;
+use super::frontier::Frontier;
+use super::outlines::Outlines;
 use super::project::Landings;
 use super::shadow_edges::ShadowEdges;
 use super::shares::carry;
@@ -116,43 +119,8 @@ pub trait CastCentres: CastRays {
     fn is_hidden(&self, sample: &SurfaceSample, counts: &mut RayCounts) -> bool;
 }
 
-/// One pixel in so many, on either axis, is proven visible whatever is known about it.
-///
-/// What was too small to be sampled when it was far away would never be met, however large it grows: nothing lands on it,
-/// and all around it agree that it is not there. Here it is met sooner or later, and from then on its edges are cast and it
-/// fills its outline, a pixel a frame.
-const LOOKOUT: usize = 16;
-
-/// One pixel in so many where what is seen has come so much nearer that such things grow fast, or does not say: where
-/// nothing landed, and in the background.
-const NEAR_LOOKOUT: usize = 8;
-
-/// The growth in a frame from which that is so.
-const FAST: f32 = 1.03;
-
-/// One pixel in so many, on either axis, has its shares confirmed.
-const RENEWED: usize = 8;
-
 /// So many samples must be known in the 3x3 around a pixel before it is filled from them.
 pub(super) const ENOUGH_TO_FILL: usize = 3;
-
-/// Pixels on a grid that stands elsewhere in each view, so that nothing stays between its points.
-#[derive(Clone, Copy)]
-struct Grid {
-    first: (usize, usize),
-}
-
-impl Grid {
-    fn of(view: &Projector) -> Self {
-        let scattered = view.scatter() as usize;
-        Self { first: (scattered % LOOKOUT, scattered / LOOKOUT % LOOKOUT) }
-    }
-
-    /// True at one pixel in `step` on either axis; a grid of half the step has all pixels of the whole one.
-    fn has(self, (x, y): (usize, usize), step: usize) -> bool {
-        x % step == self.first.0 % step && y % step == self.first.1 % step
-    }
-}
 
 /// The class of a pixel, by what landed on it and by what was found at its centre; else `class`.
 fn class_of<L, C>(landed: Option<L>, centred: Option<C>, class: PixelClass) -> PixelClass {
@@ -171,14 +139,20 @@ pub struct Centring {
     ask: Vec<u32>,
     /// For each pixel: bits of the lights of which it is in doubt whether what was carried here is right around it.
     doubt: Vec<u32>,
+    frontier: Frontier,
+    outlines: Outlines,
     shadow_edges: ShadowEdges,
 }
 
 impl Centring {
     /// The most that it holds for each pixel with so many words of shadow bits: its source, the lights to ask and
-    /// those in doubt, and, where every pixel is at a shadow's edge, its number three times, the lights to ask and the bits then.
+    /// those in doubt, and what following outlines and shadows' edges takes.
     pub fn bytes_per_pixel(words: usize) -> usize {
-        Sources::bytes_per_pixel(words) + (2 * words + 3 + 2 * words) * size_of::<u32>()
+        Sources::bytes_per_pixel(words)
+            + 2 * words * size_of::<u32>()
+            + Frontier::BYTES_PER_PIXEL
+            + Outlines::BYTES_PER_PIXEL
+            + ShadowEdges::bytes_per_pixel(words)
     }
 
     /// Centres what can be centred without a ray. All other pixels are left unknown; their class says why.
@@ -247,11 +221,9 @@ impl Centring {
                     reuse(i, &old.sample(i));
                     continue;
                 }
-                // On a chess board: what is wrong here is asked beside it.
-                let is_spared = (x + y) % 2 == 0 && trust == Trust::Neighbours;
                 let nearby = || around.known().next().filter(|_| around.known().count() >= ENOUGH_TO_FILL);
                 let centred = own.or_else(nearby).and_then(|i| {
-                    let triangles = around.surface_of(i, is_spared)?;
+                    let triangles = around.surface_of(i, trust)?;
                     let candidates = triangles.iter().map(|k| old.sample(k));
                     let sample = rays.nearest_of(x, y, candidates, &mut memory)?;
                     Some((i, sample))
@@ -260,7 +232,8 @@ impl Centring {
                     reuse(i, &sample);
                     // Where it is the very sample that landed here, its lights are known.
                     if !sources.is_centred(pixel) && !around.is_lit_alike() {
-                        let is_believed = is_spared && believes_cells(trust, rays);
+                        // On a chess board: what is wrong here is asked beside it.
+                        let is_believed = (x + y) % 2 == 0 && believes_cells(trust, rays);
                         match is_believed.then(|| around.cell(i)).flatten() {
                             Some(cell) => cell.lend(old, rays, row.lit_mut(x), ask),
                             None => {
@@ -293,126 +266,14 @@ impl Centring {
         trust: Trust,
         new: &mut BuzzBuffer,
     ) -> RayCounts {
-        let (width, words) = (old.width(), old.lit_words());
-        let sources = &self.sources;
-        let askers = rays.motion().map(Askers::new);
-        let grid = Grid::of(view);
-        let cast_row = |y: usize, mut row: Row<'_>, ask: &mut [u32], doubt: &mut [u32]| {
-            let mut counts = RayCounts::default();
-            if rays.is_cancelled() {
-                return counts;
-            }
-            for x in 0..width {
-                let pixel = y * width + x;
-                let [ask, doubt] = [&mut *ask, &mut *doubt].map(|bits| &mut bits[x * words..][..words]);
-                let known = row.object[x] != UNKNOWN;
-                let comes_near = |i: usize| old.z[i] > FAST * row.z[x] || old.z[i].is_infinite();
-                let grows = || sources.of(pixel).is_none_or(comes_near);
-                let is_lookout =
-                    moves && grid.has((x, y), NEAR_LOOKOUT) && (grid.has((x, y), LOOKOUT) || grows());
-                if known
-                    && (is_lookout || trust == Trust::Proof)
-                    && rays.is_hidden(&row.sample(x), &mut counts)
-                {
-                    row.class[x] = PixelClass::Bad;
-                    row.object[x] = UNKNOWN;
-                }
-                if moves && rays.has_shares() && grid.has((x, y), RENEWED) {
-                    rays.confirm(ask);
-                }
-                if row.object[x] == UNKNOWN {
-                    let sample = rays.hit(x, y, &mut counts);
-                    row.put(x, view, &sample);
-                    row.lit_mut(x).fill(0);
-                    ask.fill(u32::MAX);
-                    let own = sources.of(pixel);
-                    let certain = own.filter(|&i| is_one_surface(&sample, &old.sample(i), view));
-                    let mut in_cell = false;
-                    if certain.is_some() || rays.has_shares() || trust == Trust::Neighbours {
-                        let around = Around::new(old, view, sources, (x, y), 2);
-                        in_cell = around.lend(&sample, rays, (trust, certain.is_some()), row.lit_mut(x), ask);
-                        if let Some(i) = certain
-                            && rays.has_shares()
-                        {
-                            carry((old, i), view, (x, y), &sample, rays, (row.lit_mut(x), ask));
-                        }
-                    }
-                    doubt.fill(if in_cell { 0 } else { u32::MAX });
-                }
-                // Its lights were asked when it was cast, or since.
-                let settled = sources.is_centred(pixel) && ask.iter().all(|&bits| bits == 0);
-                if let Some(askers) = &askers {
-                    askers.ask(&row.sample(x), row.lit_mut(x), ask);
-                }
-                if ask.iter().any(|&bits| bits != 0) {
-                    let (sample, lit) = (row.sample(x), row.lit_mut(x));
-                    let believed = doubt.iter().all(|&bits| bits == 0);
-                    // Where what is found is not what was carried, that is in doubt around here too.
-                    let mut note =
-                        |lit: &[u32]| doubt.iter_mut().zip(lit).for_each(|(doubt, lit)| *doubt ^= lit);
-                    if believed {
-                        note(lit);
-                    }
-                    rays.recast(&sample, ask, lit, &mut counts);
-                    if believed {
-                        note(lit);
-                    }
-                    rays.settle(ask);
-                }
-                if settled {
-                    ask.fill(u32::MAX);
-                }
-            }
-            counts
-        };
-        let bits = |bits| <[u32]>::par_chunks_mut(bits, (width * words).max(1));
-        let rows = new.rows_mut().zip(bits(&mut self.ask)).zip(bits(&mut self.doubt));
-        let rows = rows.enumerate();
-        let counts: RayCounts = rows.map(|(y, ((row, ask), doubt))| cast_row(y, row, ask, doubt)).sum();
-        [counts, self.shadow_edges.follow(new, view, (&mut self.ask, &mut self.doubt), rays)]
-            .into_iter()
-            .sum()
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::scene::{Lens, Projection, View};
-    use glam::{DVec2, DVec3};
-    use std::collections::HashSet;
-
-    fn grid(eye_x: f64) -> Grid {
-        let lens = Lens {
-            projection: Projection::Perspective { yfov: 0.7 },
-            shift: DVec2::ZERO,
-            near: 0.1,
-            far: f64::INFINITY,
-        };
-        let (eye, right, up, forward) = (DVec3::X * eye_x, DVec3::X, DVec3::Y, DVec3::NEG_Z);
-        let view = View { eye, right, up, forward, lens, width: 64, height: 48, pixel_aspect: 1.0 };
-        Grid::of(&Projector::new(&view, DVec3::ZERO))
-    }
-
-    #[test]
-    fn lookouts_stand_elsewhere_in_each_view() {
-        let places: HashSet<_> = (0..400).map(|i| grid(0.001 * f64::from(i)).first).collect();
-        // Of 256 places, 400 draws leave one in five.
-        assert!(places.len() > 180, "{}", places.len());
-        assert!(grid(1.0).first == grid(1.0).first);
-    }
-
-    #[test]
-    fn the_denser_grid_has_the_places_of_the_other() {
-        for i in 0..20 {
-            let grid = grid(f64::from(i));
-            let count = |step| {
-                let pixels = (0..64).flat_map(|x| (0..64).map(move |y| (x, y)));
-                pixels.filter(|&pixel| grid.has(pixel, step)).count()
-            };
-            assert_eq!((count(LOOKOUT), count(NEAR_LOOKOUT)), (16, 64));
-            let both = |x, y| !grid.has((x, y), LOOKOUT) || grid.has((x, y), NEAR_LOOKOUT);
-            assert!((0..64).all(|x| (0..64).all(|y| both(x, y))));
+        let pass = Pass::new((old, &self.sources), (view, moves), rays, trust);
+        let mut counts = pass.cast(new, (&mut self.ask, &mut self.doubt));
+        let frontier = &mut self.frontier;
+        // Where everything is proven nothing new is met beside it.
+        if trust == Trust::Neighbours {
+            counts += self.outlines.follow(frontier, &pass, new, (&mut self.ask, &mut self.doubt));
         }
+        counts += self.shadow_edges.follow(frontier, new, view, (&mut self.ask, &mut self.doubt), rays);
+        counts
     }
 }

@@ -6,9 +6,12 @@
 //! they move every sample alike, and what comes into view finds its pixels empty.
 
 use super::Marks;
+use super::buzz_buffer::{BuzzBuffer, Projector};
+use super::cell::place_before;
+use super::project::{AT_CENTRE, Landings};
 use crate::frame::PixelClass;
 use crate::scene::View;
-use glam::{DVec3, DVec4};
+use glam::{DVec3, DVec4, Vec2};
 use rayon::prelude::*;
 
 /// Camera moves shorter than this share of k count as pure rotations: they shift nothing by a thousandth of a pixel
@@ -49,6 +52,30 @@ pub fn entering(old: &View, new: &View, k: f64, marks: &Marks) {
             marks.set(row * columns + x, PixelClass::Entering);
         }
     });
+}
+
+/// Marks the pixels at the sides of the image whose centre was not between old ones (past the paper).
+///
+/// Whatever comes in passes there, if it does so by less than a pixel a frame and no pixel is missed. Where a ray meets it,
+/// it is [followed](super::outlines) from there as far as it goes, however near it is; so there is no contested area.
+pub(super) fn at_sides(old: &BuzzBuffer, view: &Projector, landings: &Landings, marks: &Marks) {
+    let (width, height) = (old.width(), old.height());
+    let last = Vec2::new(width as f32, height as f32) - 1.0;
+    // Where all is side, a sample is good for its pixel.
+    let slack = Vec2::select(last.cmpgt(Vec2::ZERO), Vec2::splat(AT_CENTRE), Vec2::splat(0.5));
+    let mark = |x: usize, y: usize| {
+        let pixel = y * width + x;
+        let place = landings.source(pixel).and_then(|i| place_before(old, view, i, (x, y)));
+        if place.is_some_and(|p| p.cmplt(-slack).any() || p.cmpgt(last + slack).any()) {
+            marks.set(pixel, PixelClass::Entering);
+        }
+    };
+    for y in 0..height {
+        [0, width - 1].into_iter().for_each(|x| mark(x, y));
+    }
+    for x in 0..width {
+        [0, height - 1].into_iter().for_each(|y| mark(x, y));
+    }
 }
 
 /// Columns `from..to` on which a value that goes evenly from `a` (first column) to `b` (last) is not negative. Slack of

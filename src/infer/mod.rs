@@ -15,21 +15,24 @@
 //! | L, C, C1, (endx, endy), int_z | `Line` in `obscured.rs` |
 //! | test_z | in [`creeping()`] |
 //! | P, k | [`entering()`] |
-//! | X + e z_p / (d + z_p) | [`Parallax`], [`other_eye()`] |
+//! | X + e z_p / (d + z_p), positive gaps | [`Parallax`], [`other_eye()`], [`in_gaps()`] |
 //! | 2^(L-1) + 1, levels of sub-pixels | [`Lattice`], [`SubPixels`], [`Supersampling`] |
 //! | moving objects, voxels; moving and variable lights | [`Motion`], [`Voxels`] |
-//! | (not in the paper) samples at pixel centres, shadows' edges followed | [`Centring`] |
+//! | (not in the paper) samples at pixel centres; outlines and shadows' edges followed | [`Centring`] |
 
 mod alike;
 mod around;
 mod buzz_buffer;
+mod cast;
 mod cell;
 mod centre;
 mod creeping;
 mod entering;
+mod frontier;
 mod lattice;
 mod moved;
 mod obscured;
+mod outlines;
 mod project;
 mod shadow_edges;
 mod shares;
@@ -49,7 +52,7 @@ pub use lattice::{Cells, Lattice, Position};
 pub use moved::{Body, Motion};
 pub use obscured::obscured;
 pub use project::{Landings, gather, project};
-pub use stereo::{Parallax, other_eye};
+pub use stereo::{Parallax, in_gaps, other_eye};
 pub use subpixel::{Level, Samples, SubPixels};
 pub use supersample::Supersampling;
 pub use turned::turned;
@@ -58,6 +61,7 @@ pub use voxels::Voxels;
 use crate::frame::{PixelClass, RayCounts};
 use crate::scene::View;
 use creeping::forget_creeping;
+use entering::at_sides;
 use glam::DVec3;
 use moved::{moved, relight, ride};
 use rayon::prelude::*;
@@ -118,7 +122,17 @@ impl Inference {
     ) -> Cost {
         let to = Projector::new(new_view, origin);
         let mut cost = Cost::default();
-        self.reproject(by, old, old_view, new_view, origin, rays);
+        let nearest = self.reproject(by, old, old_view, new_view, origin, rays);
+        let (landings, marks) = (&self.landings, &self.marks);
+        // Clear what an old hit could be hiding.
+        match by {
+            Move::Camera => obscured(old, &Projector::new(old_view, origin), &to, landings, marks),
+            Move::OtherEye => in_gaps(old, &Parallax::between(old_view, new_view, origin), landings, marks),
+        }
+        // Clear the contested area, where new objects may come in: k is the nearest that is known.
+        if let Some(k) = nearest {
+            entering(old_view, new_view, f64::from(k), marks);
+        }
         let old = if rides(rays.motion()) { &self.now } else { old };
         gather(old, &self.landings, &self.marks, new);
 
@@ -149,16 +163,19 @@ impl Inference {
         let mut cost = Cost::default();
         self.reproject(by, old, old_view, new_view, origin, rays);
         let old = if rides(rays.motion()) { &self.now } else { old };
+        // Clear the sides, where new objects may come in.
+        at_sides(old, &to, &self.landings, &self.marks);
 
-        // Centre what lies within surfaces; cast rays at edges, at what nothing explains, and along shadows' edges.
+        // Centre what lies within surfaces. Cast rays at edges, and at what nothing explains; where they meet what was hidden or
+        // has come in, cast as far as it goes. Then along shadows' edges.
         self.centring.recentre(old, (&self.landings, &self.marks), &to, rays, trust, new);
         let moves = old_view != new_view;
         cost.add(|| self.centring.cast(old, (&to, moves), rays, trust, new));
         cost
     }
 
-    /// Finds which old sample each new pixel shows, and where that is not to be believed. Where something has moved, `now`
-    /// are the old samples after it.
+    /// Finds which old sample each new pixel shows, and before which something stands that moved or has opened to the eye.
+    /// Where something has moved, `now` are the old samples after it. Returns the least depth of all.
     fn reproject(
         &mut self,
         by: Move,
@@ -167,9 +184,9 @@ impl Inference {
         new_view: &View,
         origin: DVec3,
         rays: &impl CastRays,
-    ) {
+    ) -> Option<f32> {
         let (landings, marks) = (&mut self.landings, &mut self.marks);
-        let (from, to) = (Projector::new(old_view, origin), Projector::new(new_view, origin));
+        let to = Projector::new(new_view, origin);
 
         // Initialise the Buzzbuffer.
         landings.clear(old.object.len());
@@ -182,30 +199,20 @@ impl Inference {
         }
         let now = if rides(motion) { &self.now } else { old };
 
+        // Project the old pixels; the nearest hit wins.
         let nearest = match by {
-            Move::Camera => {
-                // Project the old pixels; the nearest hit wins.
-                let nearest = project(now, &to, landings, marks);
-                // Clear what the line L behind an old hit could be hiding.
-                obscured(old, &from, &to, landings, marks);
-                nearest
-            }
-            // Both at once, along the scan-lines.
+            Move::Camera => project(now, &to, landings, marks),
             Move::OtherEye => other_eye(old, &Parallax::between(old_view, new_view, origin), landings, marks),
         };
 
         // Clear what a surface that opens to the eye stands before (not in the paper, whose objects are solid).
         rays.turned(old_view, &|triangle| turned(triangle, &to, landings, marks));
 
-        // Clear the contested area, where new objects may come in: k is the nearest that is known.
-        if let Some(k) = nearest {
-            entering(old_view, new_view, f64::from(k), marks);
-        }
-
         // Clear what something that moved stands before.
         if let Some(motion) = motion {
             moved(now, &to, motion, landings, marks);
         }
+        nearest
     }
 }
 

@@ -9,84 +9,61 @@
 use super::around::is_one_surface;
 use super::buzz_buffer::{BuzzBuffer, Projector, pixels_around};
 use super::centre::CastCentres;
+use super::frontier::Frontier;
 use crate::frame::RayCounts;
 use rayon::prelude::*;
 use std::ops::Range;
 
-/// What following holds between frames, so that nothing is allocated for each.
+/// What following holds between frames beside its frontier, so that nothing is allocated for each.
 #[derive(Debug, Default)]
 pub(super) struct ShadowEdges {
-    /// Row by row, pixels that differ from one around them and have not asked everything, and how many each row has.
-    rows: Vec<u32>,
-    found: Vec<usize>,
-    /// Pixels to look at, in order; those to look at next.
-    pixels: Vec<u32>,
-    next: Vec<u32>,
-    /// For each of `pixels`, in as many words as a pixel has shadow bits: the lights to ask, and the bits then.
+    /// For each pixel of the frontier, in as many words as a pixel has shadow bits: the lights to ask, and the bits then.
     ask: Vec<u32>,
     lit: Vec<u32>,
 }
 
 impl ShadowEdges {
+    /// The most that it holds for each pixel with so many words of shadow bits.
+    pub fn bytes_per_pixel(words: usize) -> usize {
+        2 * words * size_of::<u32>()
+    }
+
     /// Settles the shadow bits of `buffer`, which is complete. `asked` has the bits of the lights that each pixel has
     /// asked already; those that it asks here are added. `doubt` has those about which what is around a pixel may be wrong;
     /// where one changes here, all of the pixel's are added.
     pub fn follow(
         &mut self,
+        frontier: &mut Frontier,
         buffer: &mut BuzzBuffer,
         view: &Projector,
         (asked, doubt): (&mut [u32], &mut [u32]),
         rays: &impl CastCentres,
     ) -> RayCounts {
         let mut counts = RayCounts::default();
-        let (width, words) = (buffer.width(), buffer.lit_words());
+        let words = buffer.lit_words();
         if words == 0 {
             return counts;
         }
-        self.make_room(width * buffer.height(), words);
-        self.found.resize(buffer.height(), 0);
-        let rows = self.rows.par_chunks_mut(width).zip(&mut self.found);
-        rows.with_min_len(8).enumerate().for_each(|(y, (row, found))| {
-            *found = 0;
-            let wonders = |pixel: &usize| {
-                let asked = &asked[pixel * words..][..words];
-                asked.iter().any(|&bits| bits != u32::MAX) && differs_around(buffer, *pixel, rays)
-            };
-            for first in (0..width).step_by(STRETCH) {
-                let stretch = y * width + first..y * width + (first + STRETCH).min(width);
-                if !is_even(buffer, &stretch) {
-                    for pixel in stretch.filter(wonders) {
-                        row[*found] = pixel as u32;
-                        *found += 1;
-                    }
-                }
-            }
-        });
-        let rows = self.rows.chunks(width).zip(&self.found);
-        rows.for_each(|(row, &found)| self.pixels.extend(&row[..found]));
-        while !self.pixels.is_empty() && !rays.is_cancelled() {
-            counts += self.ask(buffer, view, (asked, doubt), rays);
-            self.apply(buffer, (asked, doubt));
-        }
-        counts
-    }
-
-    /// Takes the memory for as many pixels as there can be; what is not written to costs nothing.
-    fn make_room(&mut self, pixels: usize, words: usize) {
-        self.rows.resize(pixels, 0);
-        for list in [&mut self.pixels, &mut self.next] {
-            list.clear();
-            list.reserve(pixels);
-        }
         for bits in [&mut self.ask, &mut self.lit] {
             bits.clear();
-            bits.reserve(pixels * words);
+            bits.reserve(buffer.object.len() * words);
         }
+        let wonders = |pixel: usize| {
+            let asked = &asked[pixel * words..][..words];
+            asked.iter().any(|&bits| bits != u32::MAX) && differs_around(buffer, pixel, rays)
+        };
+        frontier.begin(buffer, |stretch| is_even(buffer, &stretch), wonders);
+        while !frontier.pixels().is_empty() && !rays.is_cancelled() {
+            counts += self.ask(frontier.pixels(), buffer, view, (asked, doubt), rays);
+            self.apply(frontier, buffer, (asked, doubt));
+        }
+        counts
     }
 
     /// Asks the lights about which any neighbour disagrees.
     fn ask(
         &mut self,
+        pixels: &[u32],
         buffer: &BuzzBuffer,
         view: &Projector,
         (asked, doubt): (&[u32], &[u32]),
@@ -94,8 +71,8 @@ impl ShadowEdges {
     ) -> RayCounts {
         let words = buffer.lit_words();
         self.ask.clear();
-        self.ask.resize(self.pixels.len() * words, 0);
-        self.lit.resize(self.pixels.len() * words, 0);
+        self.ask.resize(pixels.len() * words, 0);
+        self.lit.resize(pixels.len() * words, 0);
         let ask_one = |(&pixel, (ask, lit)): (&u32, (&mut [u32], &mut [u32]))| {
             let i = pixel as usize;
             lit.copy_from_slice(buffer.lit(i));
@@ -123,32 +100,33 @@ impl ShadowEdges {
             counts
         };
         let answers = self.ask.par_chunks_mut(words).zip(self.lit.par_chunks_mut(words));
-        self.pixels.par_iter().zip(answers).with_min_len(64).map(ask_one).sum()
+        pixels.par_iter().zip(answers).with_min_len(64).map(ask_one).sum()
     }
 
     /// Takes over the answers; where they change a bit, the pixels around are looked at next.
-    fn apply(&mut self, buffer: &mut BuzzBuffer, (asked, doubt): (&mut [u32], &mut [u32])) {
-        let words = buffer.lit_words();
-        self.next.clear();
-        let answers = self.ask.chunks(words).zip(self.lit.chunks(words));
-        for (&pixel, (ask, lit)) in self.pixels.iter().zip(answers) {
-            let i = pixel as usize;
-            asked[i * words..].iter_mut().zip(ask).for_each(|(asked, ask)| *asked |= ask);
-            if buffer.lit(i) != lit {
-                doubt[i * words..][..words].fill(u32::MAX);
-                buffer.lit[i * words..][..words].copy_from_slice(lit);
-                self.next.push(pixel);
-                self.next.extend(pixels_around(buffer.width(), buffer.height(), i).map(|other| other as u32));
-            }
-        }
-        self.next.sort_unstable();
-        self.next.dedup();
-        std::mem::swap(&mut self.pixels, &mut self.next);
+    fn apply(
+        &self,
+        frontier: &mut Frontier,
+        buffer: &mut BuzzBuffer,
+        (asked, doubt): (&mut [u32], &mut [u32]),
+    ) {
+        let (words, size) = (buffer.lit_words(), (buffer.width(), buffer.height()));
+        let mut answers = self.ask.chunks(words).zip(self.lit.chunks(words));
+        let changes = |pixel: usize| {
+            answers.next().is_some_and(|(ask, lit)| {
+                let bits = pixel * words..(pixel + 1) * words;
+                asked[bits.clone()].iter_mut().zip(ask).for_each(|(asked, ask)| *asked |= ask);
+                let changes = buffer.lit(pixel) != lit;
+                if changes {
+                    doubt[bits.clone()].fill(u32::MAX);
+                    buffer.lit[bits].copy_from_slice(lit);
+                }
+                changes
+            })
+        };
+        frontier.go_on(size, changes, |_| true);
     }
 }
-
-/// Pixels of a row that are looked at together; nearly everywhere they end there.
-const STRETCH: usize = 16;
 
 /// True if the pixels of a stretch within a row are inside the image and have the same shadow bits as all around them.
 fn is_even(buffer: &BuzzBuffer, stretch: &Range<usize>) -> bool {

@@ -50,8 +50,7 @@ impl Parallax {
     }
 }
 
-/// Lands the left eye's samples in the right eye's view, the nearest on each pixel, and marks what a gap between them
-/// uncovers. Returns the least depth of all.
+/// Lands the left eye's samples in the right eye's view, the nearest on each pixel. Returns the least depth of all.
 pub fn other_eye(left: &BuzzBuffer, parallax: &Parallax, landings: &Landings, marks: &Marks) -> Option<f32> {
     let scan_line = |y: usize| {
         let row = y * left.width()..(y + 1) * left.width();
@@ -68,16 +67,22 @@ pub fn other_eye(left: &BuzzBuffer, parallax: &Parallax, landings: &Landings, ma
                 landings.land(pixel, at, i, marks);
             }
         }
-        for i in row.start..row.end - 1 {
-            if left.z[i + 1] > left.z[i] * DEPTH_STEP || left.object[i + 1] != left.object[i] {
-                clear_gap(left, i, y, parallax, landings, marks);
-            }
-        }
         nearest
     };
     let rows = (0..left.height()).into_par_iter().with_min_len(8);
     let nearest = rows.map(scan_line).reduce(|| f32::INFINITY, f32::min);
     nearest.is_finite().then_some(nearest)
+}
+
+/// Marks what a positive gap between samples uncovers.
+pub fn in_gaps(left: &BuzzBuffer, parallax: &Parallax, landings: &Landings, marks: &Marks) {
+    (0..left.height()).into_par_iter().with_min_len(8).for_each(|y| {
+        for i in y * left.width()..(y + 1) * left.width() - 1 {
+            if left.z[i + 1] > left.z[i] * DEPTH_STEP || left.object[i + 1] != left.object[i] {
+                clear_gap(left, i, y, parallax, landings, marks);
+            }
+        }
+    });
 }
 
 /// Marks what shows in the gap between sample `i` and its right neighbour, as far as something that `i` hid from the left

@@ -53,18 +53,18 @@ impl Weights {
         proof: 0.0,
     };
 
-    /// Of [`Quality::Centred`]: edges are cast in every frame that moves, holes within surfaces are filled.
+    /// Of [`Quality::Centred`]: edges are cast in every frame that moves, holes within surfaces are filled, no area is contested.
     pub const CENTRED: Self = Self {
-        contested: 1.0,
+        contested: 0.0,
         stretched: 0.0,
-        edges: 1.14,
+        edges: 0.77,
         moved: 0.5,
         missed: 0.0,
         scatter: 0.0,
         scatter_pixels: 1.0,
         inference: 0.7,
         shadows: 0.78,
-        proof: 1.0 / 64.0,
+        proof: 1.0 / 256.0,
     };
 
     /// The weights of a quality.

@@ -7,6 +7,8 @@ mod centred;
 mod five_pixels;
 mod half_pixel;
 mod moved;
+mod outlines;
 mod rig;
+mod stage;
 mod stereo;
 mod supersample;

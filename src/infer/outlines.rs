@@ -1,0 +1,80 @@
+//! Follows the outlines of what comes into view from where it was met to where it was not.
+//!
+//! What the old view did not see may come in between samples that all agree, or larger than the contested area. But it is
+//! mostly met somewhere: where a ray was cast because nothing landed, or a proof was asked for. So wherever a ray met something
+//! that stands before its neighbour and that nothing around that neighbour knows of, the neighbour is to be proven
+//! visible; where it is hidden, a ray is cast there, and the pixels around are looked at again, until the new object has been
+//! followed to its end.
+
+use super::around::is_one_surface;
+use super::buzz_buffer::{BuzzBuffer, pixels_around};
+use super::cast::Pass;
+use super::centre::CastCentres;
+use super::frontier::Frontier;
+use crate::frame::RayCounts;
+use std::ops::Range;
+
+/// What following holds between frames beside its frontier, so that nothing is allocated for each.
+#[derive(Debug, Default)]
+pub(super) struct Outlines {
+    /// For each pixel, whether it had to be proven.
+    proven: Vec<bool>,
+}
+
+impl Outlines {
+    /// What it holds for each pixel.
+    pub const BYTES_PER_PIXEL: usize = size_of::<bool>();
+
+    /// Settles which samples of `buffer`, which is complete, are reused, where `pass` casts the rays.
+    pub fn follow<R: CastCentres>(
+        &mut self,
+        frontier: &mut Frontier,
+        pass: &Pass<'_, R>,
+        buffer: &mut BuzzBuffer,
+        (ask, doubt): (&mut [u32], &mut [u32]),
+    ) -> RayCounts {
+        let mut counts = RayCounts::default();
+        self.proven.clear();
+        self.proven.resize(buffer.object.len(), false);
+        let is_even = |stretch| is_all_reused(buffer, &stretch);
+        frontier.begin(buffer, is_even, |pixel| may_be_hidden(pass, buffer, pixel));
+        while !frontier.pixels().is_empty() && !pass.rays.is_cancelled() {
+            counts += pass.prove(buffer, frontier.pixels(), (ask, doubt));
+            frontier.pixels().iter().for_each(|&pixel| self.proven[pixel as usize] = true);
+            let size = (buffer.width(), buffer.height());
+            let is_hidden = |pixel: usize| !buffer.class[pixel].is_reused();
+            frontier
+                .go_on(size, is_hidden, |pixel| !self.proven[pixel] && may_be_hidden(pass, buffer, pixel));
+        }
+        counts
+    }
+}
+
+/// True if the pixels of a stretch within a row, and all around them, are reused: nothing was met there.
+fn is_all_reused(buffer: &BuzzBuffer, stretch: &Range<usize>) -> bool {
+    let (width, height) = (buffer.width(), buffer.height());
+    let (x, y) = (stretch.start % width, stretch.start / width);
+    let columns = x.saturating_sub(1)..(x + stretch.len() + 1).min(width);
+    (y.saturating_sub(1)..=(y + 1).min(height - 1)).all(|y| {
+        let classes = &buffer.class[y * width..][columns.clone()];
+        classes.iter().fold(true, |all, class| all & class.is_reused())
+    })
+}
+
+/// True if a reused sample may be hidden by what a ray has met at a pixel beside it: something that stands before it and is of no
+/// surface that landed around it.
+fn may_be_hidden<R>(pass: &Pass<'_, R>, buffer: &BuzzBuffer, pixel: usize) -> bool {
+    let around = || pixels_around(buffer.width(), buffer.height(), pixel);
+    let is_unknown = |met: usize| {
+        let sample = buffer.sample(met);
+        let landed = around().chain([pixel]).filter_map(|around| pass.sources.of(around));
+        let mut known = [buffer.sample(pixel)].into_iter().chain(landed.map(|k| pass.old.sample(k)));
+        !known.any(|known| is_one_surface(&known, &sample, pass.view))
+    };
+    let stands_before = |met: usize| {
+        !buffer.class[met].is_reused()
+            && buffer.z[met] < buffer.z[pixel]
+            && !buffer.is_same_primitive(met, pixel)
+    };
+    buffer.class[pixel].is_reused() && around().any(|met| stands_before(met) && is_unknown(met))
+}
