@@ -43,6 +43,9 @@ pub struct Unmatched {
 pub struct FrameError {
     /// Frame number.
     pub frame: i64,
+    /// Name of its file in the folder that was compared: of a stereo pair, two have one number.
+    #[serde(default)]
+    pub file: String,
     /// The error.
     #[serde(flatten)]
     pub error: ImageError,
@@ -136,7 +139,8 @@ impl Pair {
         if let Some(folder) = pictures {
             self.draw(&a, &b, exposure, folder)?;
         }
-        let error = FrameError { frame: self.frame, error, worst_place: worst_place(&map, a.width) };
+        let file = file_name(&self.sequence);
+        let error = FrameError { frame: self.frame, file, error, worst_place: worst_place(&map, a.width) };
         Ok((error, matches!(a.kind, Some(FrameKind::Inferred { .. }))))
     }
 
@@ -149,8 +153,8 @@ impl Pair {
             picture::difference(&a.color, &b.color, width, exposure, ENHANCED),
         ];
         let parts: Vec<_> = parts.into_iter().flatten().collect();
-        let name = Path::new(self.sequence.file_name().unwrap_or_default()).with_extension("png");
-        picture::write_png(&picture::contact_sheet(&parts, 3, width), &folder.join(name))
+        let file = folder.join(file_name(&self.sequence)).with_extension("png");
+        picture::write_png(&picture::contact_sheet(&parts, 3, width), &file)
     }
 }
 
@@ -175,6 +179,11 @@ impl MeanError {
             over_5_percent: sum.over_5_percent / count,
         }
     }
+}
+
+/// The name of a file in its folder.
+fn file_name(path: &Path) -> String {
+    path.file_name().unwrap_or_default().to_string_lossy().into_owned()
 }
 
 /// By the name without its number, then by number.
@@ -207,7 +216,7 @@ fn pair_up(mut sequence: Sequences, mut reference: Sequences) -> (Vec<Pair>, Unm
     }
     let mut pairs = Vec::new();
     let mut unmatched = Unmatched::default();
-    let name = |path: PathBuf| path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+    let name = |path: PathBuf| file_name(&path);
     for (key, frames) in sequence {
         let mut counterparts = reference.remove(&key).unwrap_or_default();
         for (frame, path) in frames {
@@ -238,10 +247,15 @@ impl fmt::Display for Comparison {
                 e.flip_mean, e.max_abs
             )
         };
-        for FrameError { frame, error, worst_place } in &self.frames {
-            row(f, frame.to_string(), *error, *worst_place)?;
+        let mut numbers: Vec<_> = self.frames.iter().map(|frame| frame.frame).collect();
+        numbers.sort_unstable();
+        let one_sequence = numbers.windows(2).all(|pair| pair[0] != pair[1]);
+        let name = |of: &FrameError| if one_sequence { of.frame.to_string() } else { of.file.clone() };
+        for frame in &self.frames {
+            row(f, name(frame), frame.error, frame.worst_place)?;
         }
-        row(f, format!("worst ({})", self.worst.frame), self.worst.error, self.worst.worst_place)?;
+        let worst = &self.worst;
+        row(f, format!("worst ({})", name(worst)), worst.error, worst.worst_place)?;
         for (name, mean) in [("mean", self.mean), ("inferred mean", self.inferred_mean)] {
             if mean.frames > 0 {
                 let MeanError { psnr_db, flip_mean, max_abs, over_5_percent, .. } = mean;

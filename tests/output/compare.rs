@@ -61,7 +61,10 @@ fn a_sequence_is_compared_frame_by_frame() {
     assert_eq!(serde_json::from_value::<Comparison>(json).unwrap().frames.len(), 4);
     let text = result.to_string();
     assert!(
-        text.contains("worst (4)") && text.contains("same") && text.contains("only in the reference"),
+        text.contains("worst (4)")
+            && !text.contains("walk.0004.exr")
+            && text.contains("same")
+            && text.contains("only in the reference"),
         "{text}"
     );
 }
@@ -80,6 +83,12 @@ fn several_sequences_in_a_folder_are_kept_apart() {
     let result = compare(&a, &b, None).unwrap();
     assert_eq!(result.frames.iter().map(|f| f.frame).collect::<Vec<_>>(), [-1, 1, -1, 1]);
     assert_eq!((result.worst.error.psnr_db, result.mean.psnr_db), (None, None));
+    let files: Vec<_> = result.frames.iter().map(|f| f.file.as_str()).collect();
+    assert_eq!(
+        files,
+        ["walk.left.-001.exr", "walk.left.0001.exr", "walk.right.-001.exr", "walk.right.0001.exr"]
+    );
+    assert!(result.to_string().contains("walk.right.0001.exr  "), "{result}");
 }
 
 #[test]
