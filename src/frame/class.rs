@@ -15,11 +15,11 @@ pub enum PixelClass {
     Overlapped = 2,
     /// None landed here; traced.
     Missed = 3,
-    /// Something unknown behind an old sample could be in front; traced.
+    /// Something unknown behind an old sample could be in front, or (centred) a ray found the sample hidden; traced.
     Bad = 4,
     /// Seen through a gap between samples of one object; traced.
     Creeping = 5,
-    /// Outside the old viewing volume, where new objects may be; traced.
+    /// Outside the old viewing volume, where new objects may be, or (centred) at a side of the image that was not seen; traced.
     Entering = 6,
     /// Near an edge, traced to centre it.
     Edge = 7,

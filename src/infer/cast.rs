@@ -13,8 +13,8 @@ use rayon::prelude::*;
 /// One pixel in so many, on either axis, is proven visible whatever is known about it.
 ///
 /// What was too small to be sampled when it was far away would never be met, however large it grows: nothing lands on it,
-/// and all around it agree that it is not there. Here it is met sooner or later, and from then on its edges are cast and it
-/// fills its outline, a pixel a frame.
+/// and all around it agree that it is not there. Here it is met sooner or later, and [followed](super::outlines) to its
+/// outline.
 const LOOKOUT: usize = 32;
 
 /// One pixel in so many where what is seen has come so much nearer that such things grow fast, or does not say: where
@@ -50,7 +50,7 @@ pub(super) struct Pass<'a, R> {
     pub old: &'a BuzzBuffer,
     pub sources: &'a Sources,
     pub view: &'a Projector,
-    /// Whether the camera does.
+    /// Whether the camera moves.
     moves: bool,
     grid: Grid,
     pub rays: &'a R,
@@ -85,7 +85,7 @@ impl<'a, R: CastCentres> Pass<'a, R> {
         })
     }
 
-    /// Proves `pixels`, which are in order, visible, or casts what is.
+    /// Proves the samples of `pixels`, which are in order, visible, and casts those that are hidden.
     pub fn prove(&self, new: &mut BuzzBuffer, pixels: &[u32], bits: Bits<'_>) -> RayCounts {
         let width = self.old.width();
         self.by_rows(new, bits, |y, row, bits, counts| {
@@ -99,6 +99,7 @@ impl<'a, R: CastCentres> Pass<'a, R> {
         })
     }
 
+    /// Calls `cast_row` for each row, in parallel.
     fn by_rows(
         &self,
         new: &mut BuzzBuffer,

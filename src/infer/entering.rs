@@ -4,6 +4,8 @@
 //! from the side could be found. So no old sample is trusted on the contested area: the pixels whose pyramid, at the
 //! depth k behind which new things may be, lies outside the old viewing volume. Pure rotations need none of this:
 //! they move every sample alike, and what comes into view finds its pixels empty.
+//!
+//! Past the paper, for samples at pixel centres, less is enough: [`at_sides`].
 
 use super::Marks;
 use super::buzz_buffer::{BuzzBuffer, Projector};

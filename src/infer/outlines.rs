@@ -1,9 +1,11 @@
 //! Follows the outlines of what comes into view from where it was met to where it was not.
 //!
-//! What the old view did not see may come in between samples that all agree, or larger than the contested area. But it is
-//! mostly met somewhere: where a ray was cast because nothing landed, or a proof was asked for. So wherever a ray met something
-//! that stands before its neighbour and that nothing around that neighbour knows of, the neighbour is to be proven
-//! visible; where it is hidden, a ray is cast there, and the pixels around are looked at again, until the new object has been
+//! Past the paper: in place of its line L and its contested area, which clear whatever something unseen might be standing before.
+//!
+//! What the old view did not see may come in between samples that all agree. But it is mostly met somewhere: where nothing
+//! landed, at an outline, at a side of the image, or where a proof was asked for. So wherever a ray met something that
+//! stands before its neighbour and that nothing around that neighbour knows of, the neighbour is to be proven visible;
+//! where it is hidden, a ray is cast there, and the pixels around are looked at again, until the new object has been
 //! followed to its end.
 
 use super::around::is_one_surface;

@@ -44,7 +44,6 @@ pub struct FrameError {
     /// Frame number.
     pub frame: i64,
     /// Name of its file in the folder that was compared: of a stereo pair, two have one number.
-    #[serde(default)]
     pub file: String,
     /// The error.
     #[serde(flatten)]
@@ -182,8 +181,8 @@ impl MeanError {
 }
 
 /// The name of a file in its folder.
-fn file_name(path: &Path) -> String {
-    path.file_name().unwrap_or_default().to_string_lossy().into_owned()
+fn file_name(path: impl AsRef<Path>) -> String {
+    path.as_ref().file_name().unwrap_or_default().to_string_lossy().into_owned()
 }
 
 /// By the name without its number, then by number.
@@ -216,18 +215,17 @@ fn pair_up(mut sequence: Sequences, mut reference: Sequences) -> (Vec<Pair>, Unm
     }
     let mut pairs = Vec::new();
     let mut unmatched = Unmatched::default();
-    let name = |path: PathBuf| file_name(&path);
     for (key, frames) in sequence {
         let mut counterparts = reference.remove(&key).unwrap_or_default();
         for (frame, path) in frames {
             match counterparts.remove(&frame) {
                 Some(reference) => pairs.push(Pair { frame, sequence: path, reference }),
-                None => unmatched.sequence.push(name(path)),
+                None => unmatched.sequence.push(file_name(path)),
             }
         }
-        unmatched.reference.extend(counterparts.into_values().map(name));
+        unmatched.reference.extend(counterparts.into_values().map(file_name));
     }
-    unmatched.reference.extend(reference.into_values().flat_map(BTreeMap::into_values).map(name));
+    unmatched.reference.extend(reference.into_values().flat_map(BTreeMap::into_values).map(file_name));
     (pairs, unmatched)
 }
 
