@@ -27,6 +27,17 @@ pub enum Trust {
     Proof,
 }
 
+/// Whose shadow bits a pixel that was cast has borrowed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Lent {
+    /// None lies on its surface.
+    Nothing,
+    /// Of samples that lie around it.
+    Around,
+    /// Of a whole cell on its surface, which knows better than what only lies around.
+    Cell,
+}
+
 /// Old pixels whose samples landed near one another, in rows from the top.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Nearby {
@@ -158,7 +169,6 @@ impl<'a> Around<'a> {
 
     /// Takes over into `lit` the bits on which enough samples around that lie on the surface of `sample` agree, and the mean
     /// of their shares. Sets in `ask` those of all other lights. What is not `certain` asks all, and at least to be confirmed.
-    /// True if the bits are those of a whole cell on that surface: it knows better than what only lies around.
     pub fn lend(
         &self,
         sample: &SurfaceSample,
@@ -166,20 +176,20 @@ impl<'a> Around<'a> {
         (trust, certain): (Trust, bool),
         lit: &mut [u32],
         ask: &mut [u32],
-    ) -> bool {
+    ) -> Lent {
         let tangent = Tangent::new(*sample, self.view);
         let lends = |k: &usize| tangent.may_lend(&self.old.sample(*k));
         let mut known = self.known().filter(lends);
         let Some(first) = known.next() else {
             ask.fill(u32::MAX);
-            return false;
+            return Lent::Nothing;
         };
         if believes_cells(trust, rays)
             && let Some(cell) = Cell::of(self.old, self.view, first, self.pixel)
             && cell.corners.iter().all(lends)
         {
             cell.lend(self.old, rays, lit, ask);
-            return true;
+            return Lent::Cell;
         }
         let mut lenders = Nearby::NONE;
         std::iter::once(first).chain(known).for_each(|k| lenders.push(k));
@@ -190,7 +200,7 @@ impl<'a> Around<'a> {
         if !certain || lenders.count < enough {
             rays.confirm(ask);
         }
-        false
+        Lent::Around
     }
 }
 

@@ -194,11 +194,12 @@ impl BuzzBuffer {
 
 /// The pixels around one that are inside the image, at most eight.
 pub(super) fn pixels_around(width: usize, height: usize, pixel: usize) -> impl Iterator<Item = usize> {
+    const AROUND: [[isize; 2]; 8] = [[-1, -1], [0, -1], [1, -1], [-1, 0], [1, 0], [-1, 1], [0, 1], [1, 1]];
     let (x, y) = (pixel % width, pixel / width);
-    let columns = x.saturating_sub(1)..=(x + 1).min(width - 1);
-    let rows = y.saturating_sub(1)..=(y + 1).min(height - 1);
-    let block = rows.flat_map(move |y| columns.clone().map(move |x| y * width + x));
-    block.filter(move |&other| other != pixel)
+    AROUND.into_iter().filter_map(move |[right, down]| {
+        let (x, y) = (x.wrapping_add_signed(right), y.wrapping_add_signed(down));
+        (x < width && y < height).then(|| y * width + x)
+    })
 }
 
 /// One row of a [`BuzzBuffer`].

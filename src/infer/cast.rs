@@ -1,11 +1,12 @@
 //! The rays that are left once samples are re-centred: to see what pixels show, to prove some of what is reused, and to the
 //! lights that may have changed.
 
-use super::around::{Around, Trust, is_one_surface};
+use super::around::{Around, Lent, Trust, is_one_surface};
+use super::between;
 use super::buzz_buffer::{BuzzBuffer, Projector, Row, UNKNOWN};
 use super::centre::CastCentres;
 use super::moved::Askers;
-use super::shares::carry;
+use super::shares::{carry, spare};
 use super::sources::Sources;
 use crate::frame::{PixelClass, RayCounts};
 use rayon::prelude::*;
@@ -25,7 +26,7 @@ const NEAR_LOOKOUT: usize = 16;
 const FAST: f32 = 1.03;
 
 /// One pixel in so many, on either axis, has its shares confirmed.
-const RENEWED: usize = 8;
+const RENEWED: usize = 16;
 
 /// Pixels on a grid that stands elsewhere in each view, so that nothing stays between its points.
 #[derive(Clone, Copy)]
@@ -75,13 +76,13 @@ impl<'a, R: CastCentres> Pass<'a, R> {
     /// Casts what is wanted at all pixels.
     pub fn cast(&self, new: &mut BuzzBuffer, bits: Bits<'_>) -> RayCounts {
         self.by_rows(new, bits, |y, row, bits, counts| {
-            for x in 0..row.object.len() {
+            between::columns(row.object.len()).for_each(|x| {
                 let known = row.object[x] != UNKNOWN;
                 if known && self.wants_proof((x, y), row) {
                     self.forget_if_hidden(x, row, counts);
                 }
                 self.settle((x, y), row, self.of_pixel(bits, x), counts);
-            }
+            });
         })
     }
 
@@ -164,17 +165,24 @@ impl<'a, R: CastCentres> Pass<'a, R> {
             ask.fill(u32::MAX);
             let own = self.sources.of(pixel);
             let certain = own.filter(|&i| is_one_surface(&sample, &old.sample(i), view));
-            let mut in_cell = false;
+            let mut lent = Lent::Nothing;
             if certain.is_some() || rays.has_shares() || self.trust == Trust::Neighbours {
                 let around = Around::new(old, view, self.sources, (x, y), 2);
-                in_cell = around.lend(&sample, rays, (self.trust, certain.is_some()), row.lit_mut(x), ask);
+                lent = around.lend(&sample, rays, (self.trust, certain.is_some()), row.lit_mut(x), ask);
                 if let Some(i) = certain
                     && rays.has_shares()
                 {
                     carry((old, i), view, (x, y), &sample, rays, (row.lit_mut(x), ask));
                 }
             }
-            doubt.fill(if in_cell { 0 } else { u32::MAX });
+            // What only lies around a pixel on which nothing landed is asked anew, but for shares, which a few rays confirm.
+            let is_poor = if rays.has_shares() { lent == Lent::Nothing } else { lent != Lent::Cell };
+            if certain.is_none() && is_poor && self.trust == Trust::Neighbours {
+                between::lend(row, x, view, &sample, rays, ask);
+            } else if lent != Lent::Nothing {
+                spare((x, y), self.trust, rays, ask);
+            }
+            doubt.fill(if lent == Lent::Cell { 0 } else { u32::MAX });
         }
         // Its lights were asked when it was cast, or since.
         let settled = self.sources.is_centred(pixel) && ask.iter().all(|&bits| bits == 0);

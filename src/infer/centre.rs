@@ -28,7 +28,7 @@ use super::frontier::Frontier;
 use super::outlines::Outlines;
 use super::project::Landings;
 use super::shadow_edges::ShadowEdges;
-use super::shares::carry;
+use super::shares::{carry, spare};
 use super::sources::Sources;
 use crate::frame::{FourPoints, PixelClass, RayCounts, SurfaceRef, SurfaceSample};
 use rayon::prelude::*;
@@ -172,12 +172,6 @@ impl Centring {
             bits.resize((old.object.len() * words).max(old.height()), 0);
         }
         let sources = &self.sources;
-        // Shares are confirmed at every other pixel: a frame later, those of its neighbours are interpolated from it.
-        let spare = |(x, y): (usize, usize), ask: &mut [u32]| {
-            if trust == Trust::Neighbours && (x + y) % 2 == 0 {
-                rays.keep_edges(ask);
-            }
-        };
         let bits = |bits| <[u32]>::par_chunks_mut(bits, (width * words).max(1));
         let rows = new.rows_mut().zip(bits(&mut self.ask)).zip(bits(&mut self.doubt));
         rows.enumerate().for_each(|(y, ((mut row, ask), doubt))| {
@@ -205,7 +199,7 @@ impl Centring {
                         reuse(source, &sample);
                         if !same {
                             carry((old, source), view, (x, y), &sample, rays, (row.lit_mut(x), ask));
-                            spare((x, y), ask);
+                            spare((x, y), trust, rays, ask);
                         }
                     }
                     row.class[x] = class_of(own, centre, row.class[x]);
@@ -247,7 +241,7 @@ impl Centring {
                         if rays.has_shares() {
                             rays.soften(ask);
                             carry((old, i), view, (x, y), &sample, rays, (row.lit_mut(x), ask));
-                            spare((x, y), ask);
+                            spare((x, y), trust, rays, ask);
                         }
                     }
                 }

@@ -22,6 +22,7 @@
 
 mod alike;
 mod around;
+mod between;
 mod buzz_buffer;
 mod cast;
 mod cell;

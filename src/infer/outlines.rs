@@ -69,8 +69,10 @@ fn may_be_hidden<R>(pass: &Pass<'_, R>, buffer: &BuzzBuffer, pixel: usize) -> bo
     let around = || pixels_around(buffer.width(), buffer.height(), pixel);
     let is_unknown = |met: usize| {
         let sample = buffer.sample(met);
-        let landed = around().chain([pixel]).filter_map(|around| pass.sources.of(around));
-        let mut known = [buffer.sample(pixel)].into_iter().chain(landed.map(|k| pass.old.sample(k)));
+        // What landed there is what a ray mostly meets.
+        let landed =
+            [met].into_iter().chain(around()).chain([pixel]).filter_map(|around| pass.sources.of(around));
+        let mut known = landed.map(|k| pass.old.sample(k)).chain([buffer.sample(pixel)]);
         !known.any(|known| is_one_surface(&known, &sample, pass.view))
     };
     let stands_before = |met: usize| {
@@ -78,5 +80,15 @@ fn may_be_hidden<R>(pass: &Pass<'_, R>, buffer: &BuzzBuffer, pixel: usize) -> bo
             && buffer.z[met] < buffer.z[pixel]
             && !buffer.is_same_primitive(met, pixel)
     };
-    buffer.class[pixel].is_reused() && around().any(|met| stands_before(met) && is_unknown(met))
+    buffer.class[pixel].is_reused()
+        && is_beside_met(buffer, pixel)
+        && around().any(|met| stands_before(met) && is_unknown(met))
+}
+
+/// True if a ray was cast at any of the nine pixels around and at `pixel`.
+fn is_beside_met(buffer: &BuzzBuffer, pixel: usize) -> bool {
+    let (width, x) = (buffer.width(), pixel % buffer.width());
+    let is_inside = x > 0 && x + 1 < width && pixel > width && pixel + width < buffer.class.len();
+    let is_met = |middle: usize| buffer.class[middle - 1..middle + 2].iter().any(|class| !class.is_reused());
+    !is_inside || is_met(pixel - width) || is_met(pixel) || is_met(pixel + width)
 }

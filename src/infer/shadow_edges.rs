@@ -49,8 +49,12 @@ impl ShadowEdges {
             bits.reserve(buffer.object.len() * words);
         }
         let wonders = |pixel: usize| {
-            let asked = &asked[pixel * words..][..words];
-            asked.iter().any(|&bits| bits != u32::MAX) && differs_around(buffer, pixel, rays)
+            let own = &asked[pixel * words..][..words];
+            let asks = || {
+                let mut around = pixels_around(buffer.width(), buffer.height(), pixel);
+                around.any(|other| may_ask(buffer, (asked, doubt), (pixel, other)))
+            };
+            own.iter().any(|&bits| bits != u32::MAX) && differs_around(buffer, pixel, rays) && asks()
         };
         frontier.begin(buffer, |stretch| is_even(buffer, &stretch), wonders);
         while !frontier.pixels().is_empty() && !rays.is_cancelled() {
@@ -77,16 +81,8 @@ impl ShadowEdges {
             let i = pixel as usize;
             lit.copy_from_slice(buffer.lit(i));
             let sample = buffer.sample(i);
-            let of = |bits: &[u32], pixel: usize, word: usize| bits[pixel * words + word];
-            let in_doubt = |other: usize| {
-                (0..words).any(|w| {
-                    (of(&buffer.lit, i, w) ^ of(&buffer.lit, other, w))
-                        & (of(doubt, i, w) | of(doubt, other, w))
-                        != 0
-                })
-            };
             for other in pixels_around(buffer.width(), buffer.height(), i) {
-                if in_doubt(other)
+                if may_ask(buffer, (asked, doubt), (i, other))
                     && rays.has_edge(lit, buffer.lit(other))
                     && is_one_surface(&sample, &buffer.sample(other), view)
                 {
@@ -140,6 +136,19 @@ fn is_even(buffer: &BuzzBuffer, stretch: &Range<usize>) -> bool {
             && own == row(stretch.start - width)
             && own == row(stretch.start + width)
     }
+}
+
+/// True if `pixel` and `other` differ in a bit about which what is around either may be wrong, and `pixel` has not asked
+/// about all in which they do.
+fn may_ask(buffer: &BuzzBuffer, (asked, doubt): (&[u32], &[u32]), (pixel, other): (usize, usize)) -> bool {
+    let words = buffer.lit_words();
+    let (mut in_doubt, mut unasked) = (0, 0);
+    for (own, other) in (pixel * words..(pixel + 1) * words).zip(other * words..) {
+        let differ = buffer.lit[own] ^ buffer.lit[other];
+        in_doubt |= differ & (doubt[own] | doubt[other]);
+        unasked |= differ & !asked[own];
+    }
+    in_doubt != 0 && unasked != 0
 }
 
 /// True where an edge of a shadow may lie between a pixel and one around it.

@@ -5,7 +5,7 @@
 //! would slide over its surface. So it is interpolated at the point of the old image that has come to the centre. Besides,
 //! that averages the noise of what few rays have found.
 
-use super::around::Tangent;
+use super::around::{Tangent, Trust};
 use super::buzz_buffer::{BuzzBuffer, Projector};
 use super::cell::place_before;
 use super::centre::CastCentres;
@@ -54,5 +54,12 @@ pub(super) fn carry(
     match known.next() {
         Some(&(first, _)) => known.for_each(|&(other, _)| rays.differ(old.lit(first), old.lit(other), ask)),
         None => rays.confirm(ask),
+    }
+}
+
+/// Asks shares to be confirmed at every other pixel only: a frame later, those of its neighbours are interpolated from it.
+pub(super) fn spare((x, y): (usize, usize), trust: Trust, rays: &impl CastCentres, ask: &mut [u32]) {
+    if trust == Trust::Neighbours && (x + y) % 2 == 0 {
+        rays.keep_edges(ask);
     }
 }

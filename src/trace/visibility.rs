@@ -23,6 +23,8 @@ pub(super) struct Layout {
     edge: Vec<[u8; 4]>,
     /// For each word, the bits that are none of a share's.
     single_bits: Vec<u32>,
+    /// For each word, those and the highest bit of each light's share: where all of these are the same there is no edge.
+    edge_bits: Vec<u32>,
     /// For each word, those and the lowest bit of each share: what asks to confirm shares, and for all else.
     confirming: Vec<u32>,
 }
@@ -81,11 +83,15 @@ impl Layout {
         for field in &shares {
             single_bits[field.word] &= !(field.whole << field.shift);
         }
+        let mut edge_bits = single_bits.clone();
+        for field in shares.iter().filter(|&&field| ambient != Some(field)) {
+            edge_bits[field.word] |= (field.whole ^ field.whole >> 1) << field.shift;
+        }
         let mut confirming = single_bits.clone();
         for field in &shares {
             confirming[field.word] |= 1 << field.shift;
         }
-        Self { lights, ambient, words, shares, noise, edge, single_bits, confirming }
+        Self { lights, ambient, words, shares, noise, edge, single_bits, edge_bits, confirming }
     }
 
     /// Whether any light has a share.
@@ -157,7 +163,9 @@ impl Layout {
 
     /// True if `a` and `b` may be on two sides of the edge of a light's shadow.
     pub fn has_edge(&self, a: &[u32], b: &[u32]) -> bool {
-        !self.are_within(&self.edge, a, b)
+        // Numbers that are more than half of all apart differ in the highest bit.
+        let mut words = a.iter().zip(b).zip(&self.edge_bits);
+        words.any(|((a, b), bits)| (a ^ b) & bits != 0) && !self.are_within(&self.edge, a, b)
     }
 
     /// True if all single bits are the same, and all shares no farther apart than `most` steps.
