@@ -44,7 +44,7 @@ impl Antialias {
         let stored = Samples::of(buffer);
         let count = buffer.object.len();
         self.pixels.resize(count, Pixel::default());
-        let shader = || resolver.tracer.shader();
+        let shader = || resolver.shader();
         let shade_pixels = |shader: &mut Shader<'_, '_>, (k, pixels): (usize, &mut [Pixel])| {
             let mut counts = RayCounts::default();
             if resolver.observer.stop_requested().is_none() {
@@ -134,7 +134,7 @@ fn shade_level(
     let lit = lit.par_chunks_mut(stride * SHADED_AT_ONCE);
     let places = cells.positions().par_chunks(SHADED_AT_ONCE).zip(samples.par_chunks_mut(SHADED_AT_ONCE));
     let places = places.zip(lit).zip(pixels.par_chunks_mut(SHADED_AT_ONCE));
-    let shader = || resolver.tracer.shader();
+    let shader = || resolver.shader();
     type Places<'p> = (((&'p [Position], &'p mut [SurfaceSample]), &'p mut [u32]), &'p mut [Pixel]);
     let shade = |shader: &mut Shader<'_, '_>, (((places, samples), lit), pixels): Places<'_>| {
         let mut counts = RayCounts::default();

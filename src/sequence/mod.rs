@@ -17,9 +17,10 @@ pub use path::camera_path;
 use crate::accel::Accel;
 use crate::error::{Error, Result};
 use crate::frame::{
-    Aov, AovSet, Frame, FrameId, FrameKind, FrameStats, PixelClass, StageSeconds, StereoEye, Window,
+    Aov, AovSet, Frame, FrameId, FrameKind, FrameStats, PixelClass, StageSeconds, StereoEye, SurfaceSample,
+    Window,
 };
-use crate::infer::{BuzzBuffer, Inference, Move, Projector, SubPixels, Trust};
+use crate::infer::{BuzzBuffer, Inference, Move, Projector, SeenLight, SubPixels, Trust};
 use crate::plan::{Plan, Segment};
 use crate::scene::{Requirements, Scene, Stereo};
 use crate::trace::{TraceOptions, Tracer, lit_words};
@@ -382,6 +383,10 @@ impl Emitter<'_> {
             frame.kind = kind;
             frame.view = shot.full_view;
             frame.camera.clone_from(&self.scene.cameras[shot.camera].name);
+            let seen = SeenLight::new(buffer, &shot.view, self.origin);
+            let known = |point: &SurfaceSample| seen.lit(point, |a, b| tracer.agree(a, b));
+            // Key frames are traced in all respects, and what is to be proven is not taken from what is seen elsewhere.
+            let is_trusted = kind != FrameKind::Traced && self.settings.quality == Quality::Centred;
             let resolver = Resolver {
                 scene: self.scene,
                 settings: self.settings,
@@ -393,6 +398,7 @@ impl Emitter<'_> {
                 shot,
                 next: self.neighbour(accel, shot, number + 1, self.cuts.contains(&(number + 1))),
                 previous: self.neighbour(accel, shot, number - 1, self.cuts.contains(&number)),
+                known: is_trusted.then_some(&known),
                 names: self.names.as_ref(),
             };
             stats.rays += resolver.resolve(buffer, self.antialias, &mut frame);

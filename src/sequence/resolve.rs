@@ -6,7 +6,7 @@ use crate::accel::Displaced;
 use crate::frame::{Aov, Frame, FrameKind, FrameStats, Matte, RayCounts, SurfaceSample, Window};
 use crate::infer::BuzzBuffer;
 use crate::scene::{Scene, View};
-use crate::trace::{Eye, Radiance, SHADED_AT_ONCE, Shader, Tracer};
+use crate::trace::{Eye, KnownLight, Radiance, SHADED_AT_ONCE, Shader, Tracer};
 use glam::{DVec3, DVec4, Vec3, Vec4};
 use rayon::iter::Either;
 use rayon::prelude::*;
@@ -30,6 +30,8 @@ pub(super) struct Resolver<'a> {
     pub next: Option<Neighbour>,
     /// The frame before.
     pub previous: Option<Neighbour>,
+    /// What mirrored rays need not ask of light; none where all of them ask.
+    pub known: Option<&'a KnownLight<'a>>,
     /// Names for mattes; none where not asked for.
     pub names: Option<&'a MatteNames>,
 }
@@ -70,7 +72,12 @@ impl Pixel {
     }
 }
 
-impl Resolver<'_> {
+impl<'a> Resolver<'a> {
+    /// A shader for the samples of one thread.
+    pub(super) fn shader(&self) -> Shader<'a, 'a> {
+        self.tracer.shader().knowing(self.known)
+    }
+
     /// Fills the layers that the settings ask for; returns the rays that reflection and refraction took.
     pub fn resolve(&self, buffer: &BuzzBuffer, antialias: &mut Antialias, frame: &mut Frame) -> RayCounts {
         let window = self.settings.window;
@@ -137,7 +144,7 @@ impl Resolver<'_> {
     }
 
     fn shade(&self, buffer: &BuzzBuffer, frame: &mut Frame) -> RayCounts {
-        let shader = || self.tracer.shader();
+        let shader = || self.shader();
         self.fill_rows(frame, buffer.width(), shader, |shader, first, pixels, counts| {
             self.shade_pixels(shader, buffer, first, pixels, counts);
         })

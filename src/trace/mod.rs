@@ -42,6 +42,7 @@ use std::f32::consts::FRAC_1_PI;
 use surface::{ShadingMaterial, Surface, occlusion};
 use visibility::{Field, Inquiry, Layout};
 use whitted::Incoming;
+pub use whitted::KnownLight;
 use world::Surroundings;
 
 /// Something this much nearer than a sample, as a share of its distance, hides it.

@@ -5,7 +5,7 @@ use super::lanes::{LANES, Lanes, Vec3x4};
 use super::point::{Side, SurfacePoint};
 use super::receivers::{Brought, Receivers};
 use super::surface::Surface;
-use super::whitted::{Incoming, Path};
+use super::whitted::{Incoming, KnownLight, Path};
 use super::{Eye, Radiance, Tracer};
 use crate::frame::{RayCounts, SurfaceSample};
 use glam::Vec3;
@@ -23,12 +23,14 @@ pub struct Shader<'t, 'a> {
     tracer: &'t Tracer<'a>,
     /// Where the last samples are, one to a lane.
     points: Option<[SurfacePoint<'a>; LANES]>,
+    /// What is known of light where mirrored and refracted rays end.
+    known: Option<&'t KnownLight<'t>>,
 }
 
 impl<'a> Tracer<'a> {
     /// For the samples of one thread.
     pub fn shader(&self) -> Shader<'_, 'a> {
-        Shader { tracer: self, points: None }
+        Shader { tracer: self, points: None, known: None }
     }
 
     /// [`Shader::shade`] for a single sample.
@@ -37,7 +39,12 @@ impl<'a> Tracer<'a> {
     }
 }
 
-impl Shader<'_, '_> {
+impl<'t> Shader<'t, '_> {
+    /// Mirrored and refracted rays ask no lights where it is `known` which of them shine.
+    pub fn knowing(self, known: Option<&'t KnownLight<'t>>) -> Self {
+        Self { known, ..self }
+    }
+
     /// [`Shader::shade_four`] for a single sample.
     pub fn shade(
         &mut self,
@@ -87,7 +94,7 @@ impl Shader<'_, '_> {
         rays: &mut RayCounts,
         radiance: &mut [Radiance; LANES],
     ) {
-        let tracer = self.tracer;
+        let (tracer, known) = (self.tracer, self.known);
         let points = self.points(samples);
         let (toward, widths) = eye.seen_from_four(Vec3x4::of(|lane| samples[lane].position));
         let beam = |lane: usize| Beam { width: widths[lane], spread: eye.spread() };
@@ -123,7 +130,7 @@ impl Shader<'_, '_> {
                 incoming.irradiance += brought.irradiance.lane(lane);
                 incoming.highlights += highlights.lane(lane);
             }
-            let leaving = tracer.leaving(it, surface, toward, &incoming, &Path::new(beam(lane)), rays);
+            let leaving = tracer.leaving(it, surface, toward, &incoming, &Path::new(beam(lane), known), rays);
             let is_finite = leaving.total().is_finite();
             radiance[lane] = if is_finite { leaving } else { leaving.where_finite() };
         }

@@ -11,7 +11,7 @@ use super::surface::Surface;
 use super::visibility::Inquiry;
 use super::{Radiance, Tracer};
 use crate::accel::{Ray, Sides};
-use crate::frame::RayCounts;
+use crate::frame::{RayCounts, SurfaceSample};
 use glam::{Vec3, Vec4};
 use std::f32::consts::{FRAC_1_PI, TAU};
 
@@ -22,9 +22,12 @@ const MIN_SHARE: f32 = 1.0 / 256.0;
 /// than 1e-4 of what a white diffuse surface does.
 pub(super) const MIN_LOBE: f32 = 1e-4;
 
+/// Says which shadow bits a point of a surface has, where that is known without a ray.
+pub type KnownLight<'k> = dyn Fn(&SurfaceSample) -> Option<&'k [u32]> + Sync + 'k;
+
 /// How a point came to be looked at.
 #[derive(Clone, Copy)]
-pub(super) struct Path {
+pub(super) struct Path<'k> {
     /// Mirrored and refracted rays so far.
     bounces: u32,
     /// Share of what leaves the point that reaches the pixel.
@@ -34,6 +37,8 @@ pub(super) struct Path {
     beam: Beam,
     /// Absorption of the solid that the path is inside, 1/m.
     inside: Vec3,
+    /// What is known of light at what is met.
+    known: Option<&'k KnownLight<'k>>,
 }
 
 /// The two kinds of secondary rays that are counted.
@@ -43,10 +48,10 @@ enum Kind {
     Refraction,
 }
 
-impl Path {
+impl<'k> Path<'k> {
     /// From the eye.
-    pub fn new(beam: Beam) -> Self {
-        Self { bounces: 0, share: Vec3::ONE, kind: None, beam, inside: Vec3::ZERO }
+    pub fn new(beam: Beam, known: Option<&'k KnownLight<'k>>) -> Self {
+        Self { bounces: 0, share: Vec3::ONE, kind: None, beam, inside: Vec3::ZERO, known }
     }
 
     /// On by a ray of `kind` that carries `share`.
@@ -173,7 +178,7 @@ impl Tracer<'_> {
         surface: &Surface,
         toward: Vec3,
         incoming: &Incoming,
-        path: &Path,
+        path: &Path<'_>,
         rays: &mut RayCounts,
     ) -> Radiance {
         let coverage = self.coverage(surface, path.bounces);
@@ -213,7 +218,7 @@ impl Tracer<'_> {
         toward: Vec3,
         openness: f32,
         coverage: f32,
-        path: &Path,
+        path: &Path<'_>,
         rays: &mut RayCounts,
     ) -> Vec3 {
         let sharp = surface.mirror;
@@ -251,7 +256,7 @@ impl Tracer<'_> {
         surface: &Surface,
         toward: Vec3,
         coverage: f32,
-        path: &Path,
+        path: &Path<'_>,
         rays: &mut RayCounts,
     ) -> Vec3 {
         let cos = it.normal.dot(toward).clamp(0.0, 1.0);
@@ -274,8 +279,8 @@ impl Tracer<'_> {
         &self,
         it: &SurfaceInteraction,
         direction: Vec3,
-        path: &Path,
-        next: Path,
+        path: &Path<'_>,
+        next: Path<'_>,
         rays: &mut RayCounts,
     ) -> Vec3 {
         if path.bounces >= self.options.bounces {
@@ -285,7 +290,7 @@ impl Tracer<'_> {
     }
 
     /// What comes along a secondary ray.
-    fn trace(&self, origin: Vec3, direction: Vec3, mut path: Path, rays: &mut RayCounts) -> Vec3 {
+    fn trace(&self, origin: Vec3, direction: Vec3, mut path: Path<'_>, rays: &mut RayCounts) -> Vec3 {
         path.count(rays);
         let ray = Ray { origin, direction, t_min: 0.0, t_max: f32::INFINITY };
         let Some(hit) = self.accel.intersect(self.scene, &ray, Sides::Visible) else {
@@ -303,12 +308,18 @@ impl Tracer<'_> {
         let surface = self.surface(&it, &mut room);
         let mut incoming = Incoming::default();
         if !it.point.material.unlit {
+            let lit = path.known.and_then(|known| known(&self.sample(hit.surface, &point)));
             // As few rays as the path brings little to the pixel.
             let inquiry = Inquiry::Part(path.share.max_element());
-            let openness = |_| self.world_share(&point, inquiry, || path.count(rays));
-            let ambient = self.layout.ambient.map_or(1.0, openness);
+            let ambient = self.layout.ambient.map_or(1.0, |field| match lit {
+                Some(lit) => field.share(lit),
+                None => self.world_share(&point, inquiry, || path.count(rays)),
+            });
             incoming = self.skylight(&it, ambient);
-            let mut share = |number| self.light_share(&point, number, inquiry, || path.count(rays));
+            let mut share = |number: usize| match lit {
+                Some(lit) => self.layout.lights[number].share(lit),
+                None => self.light_share(&point, number, inquiry, || path.count(rays)),
+            };
             for lights in &self.delta_lights {
                 let reach = |lanes: Lanes| lanes.filter(|lane| share(lights.number(lane)) > 0.0);
                 incoming.add_four(&it, surface, -direction, lights, Lanes::ALL, reach);

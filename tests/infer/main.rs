@@ -10,6 +10,7 @@ mod half_pixel;
 mod moved;
 mod outlines;
 mod rig;
+mod seen;
 mod stage;
 mod stereo;
 mod supersample;

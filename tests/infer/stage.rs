@@ -31,6 +31,10 @@ impl<'a> Eye<'a> {
         Self { stage, view, asked: Mutex::default() }
     }
 
+    pub fn view(&self) -> &View {
+        &self.view
+    }
+
     fn met(&self, (object, depth): (u32, f64), x: usize, y: usize) -> SurfaceSample {
         let ray = self.view.ray(x as f64 + 0.5, y as f64 + 0.5);
         let position = ray.origin + ray.direction * (depth / -ray.direction.z);
