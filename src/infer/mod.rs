@@ -19,6 +19,7 @@
 //! | 2^(L-1) + 1, levels of sub-pixels | [`Lattice`], [`SubPixels`], [`Supersampling`] |
 //! | moving objects, voxels; moving and variable lights | [`Motion`], [`Voxels`] |
 //! | (not in the paper) samples at pixel centres; outlines and shadows' edges followed | [`Centring`] |
+//! | (not in the paper) the light on what is mirrored | [`SeenLight`] |
 
 mod alike;
 mod around;

@@ -22,7 +22,7 @@ use crate::frame::{
 };
 use crate::infer::{BuzzBuffer, Inference, Move, Projector, SeenLight, SubPixels, Trust};
 use crate::plan::{Plan, Segment};
-use crate::scene::{Requirements, Scene, Stereo};
+use crate::scene::{Requirements, Scene, Stereo, View};
 use crate::trace::{TraceOptions, Tracer, lit_words};
 use antialias::Antialias;
 use caster::{Caster, mix};
@@ -240,12 +240,25 @@ fn render_segment(
 ) -> Result<()> {
     let key_shot = Shot::new(scene, settings, segment.key);
     let origin = key_shot.view.eye;
+    let right_eye = settings.stereo.map(|_| StereoEye::Right);
+    let key_views = [key_shot.full_view, Shot::of_eye(right_eye, scene, settings, segment.key).full_view];
     let infers = segment.first < segment.last;
     buffers.fit(settings, infers, lit_words(scene, settings.trace_options()));
     let names = settings.aovs.contains(Aov::Crypto).then(|| MatteNames::of(scene));
     let Buffers { carried, antialias } = buffers;
-    let mut emitter =
-        Emitter { scene, settings, segment, origin, cuts, wanted, names, antialias, sink, observer };
+    let mut emitter = Emitter {
+        scene,
+        settings,
+        segment,
+        origin,
+        key_views,
+        cuts,
+        wanted,
+        names,
+        antialias,
+        sink,
+        observer,
+    };
 
     accel.place(scene, &key_shot.pose, origin);
     let tracer = Tracer::new(scene, accel, &key_shot.pose, settings.trace_options());
@@ -271,6 +284,8 @@ struct Emitter<'a> {
     settings: &'a Settings,
     segment: &'a Segment,
     origin: DVec3,
+    /// What the key frame shows, of the left or only eye, and of the right one.
+    key_views: [View; 2],
     cuts: &'a [i64],
     wanted: &'a BTreeSet<i64>,
     names: Option<MatteNames>,
@@ -385,8 +400,10 @@ impl Emitter<'_> {
             frame.camera.clone_from(&self.scene.cameras[shot.camera].name);
             let seen = SeenLight::new(buffer, &shot.view, self.origin);
             let known = |point: &SurfaceSample| seen.lit(point, |a, b| tracer.agree(a, b));
-            // Key frames are traced in all respects, and what is to be proven is not taken from what is seen elsewhere.
-            let is_trusted = kind != FrameKind::Traced && self.settings.quality == Quality::Centred;
+            // Key frames are traced in all respects, and as long as the camera is held there nothing changes. What is to be
+            // proven is not taken from what is seen elsewhere.
+            let moves = shot.full_view != self.key_views[usize::from(shot.eye == Some(StereoEye::Right))];
+            let is_trusted = moves && self.settings.quality == Quality::Centred;
             let resolver = Resolver {
                 scene: self.scene,
                 settings: self.settings,

@@ -19,6 +19,11 @@ fn place(scene: &mut Scene, shape: Shape, material: usize, x: f64, y: f64, z: f6
 
 /// One of each shape on an endless floor, under two lights, and a camera that moves past them.
 fn all_shapes() -> Scene {
+    seen_from(vec![-1.0, 2.2, 8.0, 0.2, 2.4, 7.4])
+}
+
+/// The same from the first to the second of two places.
+fn seen_from(places: Vec<f32>) -> Scene {
     let mut scene = Scene::default();
     let colours =
         [Vec3::new(0.7, 0.2, 0.1), Vec3::new(0.1, 0.5, 0.2), Vec3::new(0.2, 0.3, 0.7), Vec3::splat(0.6)];
@@ -41,8 +46,7 @@ fn all_shapes() -> Scene {
     scene.add_light(LightKind::Point, 160.0, DAffine3::from_translation(DVec3::new(4.0, 6.0, 5.0)));
     scene.add_light(LightKind::Point, 60.0, DAffine3::from_translation(DVec3::new(-5.0, 4.0, 2.0)));
     let camera = scene.add_camera(DVec3::new(-1.0, 2.2, 8.0), DVec3::new(0.0, 0.7, 0.0), 0.6);
-    let values = vec![-1.0, 2.2, 8.0, 0.2, 2.4, 7.4];
-    move_along(&mut scene, camera, values);
+    move_along(&mut scene, camera, places);
     scene
 }
 
@@ -79,6 +83,26 @@ fn compared(frames: &[Frame], truth: &[Frame]) -> (f64, f64) {
     let (cast, full) = inferred().fold((0.0, 0.0), |(a, b), (x, y)| (a + rays(x), b + rays(y)));
     assert!(full > 0.0 && !values.is_empty(), "nothing was inferred, or nothing differs");
     (values.iter().sum::<f64>() / values.len() as f64, 1.0 - cast / full)
+}
+
+#[test]
+fn what_a_mirror_shows_is_lit_as_the_eye_sees_it() {
+    let scene = all_shapes();
+    let of = |quality| render(&scene, Settings { quality, ..Settings::new(320, 180) });
+    let (traced, centred) = (of(Quality::Full), of(Quality::Centred));
+    for (a, b) in centred.iter().zip(&traced) {
+        let [a, b, kind] =
+            [a.stats.rays.reflection, b.stats.rays.reflection, u64::from(a.kind == FrameKind::Traced)];
+        assert!(if kind == 1 { a == b } else { a > 0 && 10 * a < 9 * b }, "{a} of {b}");
+    }
+}
+
+#[test]
+fn a_camera_that_is_held_shows_mirrors_as_the_key_frame_does() {
+    let scene = seen_from(vec![-1.0, 2.2, 8.0, -1.0, 2.2, 8.0]);
+    let frames = render(&scene, Settings { quality: Quality::Centred, ..Settings::new(160, 90) });
+    assert_eq!(frames.iter().filter(|frame| frame.kind != FrameKind::Traced).count() as i64, FRAMES);
+    assert!(frames.iter().all(|frame| frame.color == frames[0].color));
 }
 
 #[test]
