@@ -90,10 +90,10 @@ fn what_a_mirror_shows_is_lit_as_the_eye_sees_it() {
     let scene = all_shapes();
     let of = |quality| render(&scene, Settings { quality, ..Settings::new(320, 180) });
     let (traced, centred) = (of(Quality::Full), of(Quality::Centred));
-    for (a, b) in centred.iter().zip(&traced) {
-        let [a, b, kind] =
-            [a.stats.rays.reflection, b.stats.rays.reflection, u64::from(a.kind == FrameKind::Traced)];
-        assert!(if kind == 1 { a == b } else { a > 0 && 10 * a < 9 * b }, "{a} of {b}");
+    for (frame, truth) in centred.iter().zip(&traced) {
+        let [cast, all] = [frame, truth].map(|frame| frame.stats.rays.reflection);
+        let is_key = frame.kind == FrameKind::Traced;
+        assert!(if is_key { cast == all } else { cast > 0 && 10 * cast < 9 * all }, "{cast} of {all}");
     }
 }
 
