@@ -242,6 +242,14 @@ impl<'a> Tangent<'a> {
         (other.normal == self.sample.normal || faces_alike()) && self.reaches(other)
     }
 
+    /// True if a pixel of `buffer` may lend, and shows the same instance: the bars of a window and the panes behind them are two
+    /// things, though they are within a pixel's width.
+    pub fn may_borrow_from(&self, buffer: &BuzzBuffer, pixel: usize) -> bool {
+        let (surface, own) = (buffer.surface[pixel], self.sample.surface);
+        let is_same_face = surface.primitive == own.primitive && buffer.normal[pixel] == self.sample.normal;
+        surface.instance == own.instance && (is_same_face || self.may_lend(&buffer.sample(pixel)))
+    }
+
     /// See [`is_one_surface`].
     fn reaches(&self, other: &SurfaceSample) -> bool {
         if self.sample.object != other.object {

@@ -33,8 +33,12 @@ pub(super) fn place_before(
 impl Cell {
     /// The cell of [`place_before`]; none where that was outside of the image.
     pub fn of(old: &BuzzBuffer, view: &Projector, i: usize, pixel: (usize, usize)) -> Option<Self> {
-        let place = place_before(old, view, i, pixel)?;
-        let (width, height) = (old.width(), old.height());
+        Self::at(old, place_before(old, view, i, pixel)?)
+    }
+
+    /// The cell around a place, in pixels from the middle of the first one; none outside of the outermost pixels' centres.
+    pub fn at(buffer: &BuzzBuffer, place: Vec2) -> Option<Self> {
+        let (width, height) = (buffer.width(), buffer.height());
         let last = Vec2::new(width as f32, height as f32) - 1.0;
         (place.cmpge(Vec2::ZERO).all() && place.cmplt(last).all()).then(|| {
             let first = place.y as usize * width + place.x as usize;
@@ -42,10 +46,15 @@ impl Cell {
         })
     }
 
+    /// The corner to which the place is nearest.
+    pub fn nearest(&self) -> usize {
+        let [right, down] = self.offset.to_array().map(|offset| usize::from(offset >= 0.5));
+        self.corners[2 * down + right]
+    }
+
     /// Takes over into `lit` the shadow bits of the nearest corner, and sets in `ask` those on which the corners disagree.
     pub fn lend(&self, old: &BuzzBuffer, rays: &impl CastCentres, lit: &mut [u32], ask: &mut [u32]) {
-        let [right, down] = self.offset.to_array().map(|offset| usize::from(offset >= 0.5));
-        let nearest = self.corners[2 * down + right];
+        let nearest = self.nearest();
         lit.copy_from_slice(old.lit(nearest));
         ask.fill(0);
         for other in self.corners.into_iter().filter(|&other| !old.is_lit_alike(nearest, other)) {

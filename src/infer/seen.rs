@@ -5,6 +5,7 @@
 
 use super::around::Tangent;
 use super::buzz_buffer::{BuzzBuffer, Projector};
+use super::cell::Cell;
 use crate::frame::SurfaceSample;
 use crate::scene::View;
 use glam::{DVec3, Vec2};
@@ -26,25 +27,10 @@ impl<'a> SeenLight<'a> {
     pub fn lit(&self, point: &SurfaceSample, agree: impl Fn(&[u32], &[u32]) -> bool) -> Option<&'a [u32]> {
         let buffer = self.buffer;
         let at = self.view.project(point.position, point.normal.direction(), false)?;
-        let place = Vec2::new(at.x, at.y) - 0.5;
-        let last = Vec2::new(buffer.width() as f32, buffer.height() as f32) - 1.0;
-        if !(place.cmpge(Vec2::ZERO).all() && place.cmplt(last).all()) {
-            return None;
-        }
-        let first = place.y as usize * buffer.width() + place.x as usize;
-        let corners = [first, first + 1, first + buffer.width(), first + buffer.width() + 1];
-        let tangent = Tangent::new(*point, &self.view);
-        let is_seen = |&pixel: &usize| {
-            let (surface, own) = (buffer.surface[pixel], point.surface);
-            let is_same_face = surface.primitive == own.primitive && buffer.normal[pixel] == point.normal;
-            surface.instance == own.instance && (is_same_face || tangent.may_lend(&buffer.sample(pixel)))
-        };
-        if !corners.iter().all(is_seen) {
-            return None;
-        }
-        let offset = place.fract();
-        let nearest = corners[2 * usize::from(offset.y >= 0.5) + usize::from(offset.x >= 0.5)];
-        let lit = buffer.lit(nearest);
-        corners.iter().all(|&pixel| agree(lit, buffer.lit(pixel))).then_some(lit)
+        let cell = Cell::at(buffer, Vec2::new(at.x, at.y) - 0.5)?;
+        let (tangent, lit) = (Tangent::new(*point, &self.view), buffer.lit(cell.nearest()));
+        let is_seen = |&pixel: &usize| tangent.may_borrow_from(buffer, pixel);
+        let agrees = |&pixel: &usize| agree(lit, buffer.lit(pixel));
+        (cell.corners.iter().all(is_seen) && cell.corners.iter().all(agrees)).then_some(lit)
     }
 }

@@ -42,12 +42,7 @@ pub(super) fn carry(
         }
         let pixel = y as usize * width + x as usize;
         let weight = columns[right] * rows[down];
-        // The bars of a window and the panes behind them are two things, though they are within a pixel's width.
-        let is_same_thing = old.surface[pixel].instance == sample.surface.instance;
-        let is_same_face =
-            old.surface[pixel].primitive == sample.surface.primitive && old.normal[pixel] == sample.normal;
-        let lends = is_same_thing && (is_same_face || tangent.may_lend(&old.sample(pixel)));
-        (pixel, if lends { weight } else { 0.0 })
+        (pixel, if tangent.may_borrow_from(old, pixel) { weight } else { 0.0 })
     });
     let mut known = corners.iter().filter(|&&(_, weight)| weight > 0.0);
     rays.blend(known.clone().map(|&(pixel, weight)| (old.lit(pixel), weight)), lit);
