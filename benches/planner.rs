@@ -28,7 +28,8 @@ const EVERY: usize = 13;
 const REACH: i64 = 8;
 
 /// The weights of shares.
-const FITTED: [fn(&mut Weights) -> &mut f64; 6] = [
+const FITTED: [fn(&mut Weights) -> &mut f64; 7] = [
+    |w| &mut w.outside,
     |w| &mut w.contested,
     |w| &mut w.stretched,
     |w| &mut w.edges,

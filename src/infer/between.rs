@@ -1,27 +1,70 @@
-//! The light of pixels on which nothing landed, from pixels of their row that were cast before them.
+//! What pixels show on which nothing landed, and how that is lit, from pixels of their row that were cast before them.
 //!
-//! Where much comes into view at once, as in a whip pan, no old sample says how it is lit, and all of it would ask every light.
-//! But what is cast there is of surfaces that are lit alike over many pixels. So one pixel in [`STEP`] of a row asks, then the
-//! one in the middle between two of these, then those between: each only about what its two neighbours do not agree on.
+//! Where much comes into view at once, as in a whip pan, no old sample says anything, and all of it would be cast and ask every
+//! light. But most of it is surfaces that reach over many pixels and are lit alike. So one pixel in [`STEP`] of a row is cast and
+//! asks, then the one in the middle between two of these, then those between: they are cast only where these two do not show one
+//! surface, and ask only about what they do not agree on.
+//!
+//! A pixel is filled so only if nothing landed around it either: elsewhere an outline is near. What is too narrow for one row is
+//! met in another, whose steps begin elsewhere, and from there [followed](super::outlines).
 
 use super::around::Tangent;
-use super::buzz_buffer::{Projector, Row};
+use super::buzz_buffer::{Projector, Row, UNKNOWN};
 use super::centre::CastCentres;
 use crate::frame::SurfaceSample;
 
-/// One pixel of a row in so many asks for itself.
-const STEP: usize = 4;
+/// One pixel of a row in so many is cast and asks for itself.
+const STEP: usize = 8;
 
-/// The columns of a row, each after those between which it lies.
-pub(super) fn columns(width: usize) -> impl Iterator<Item = usize> {
-    let stop = |stop: usize| [Some(stop), stop.checked_sub(2), stop.checked_sub(3), stop.checked_sub(1)];
-    (0..width + STEP).step_by(STEP).flat_map(stop).flatten().filter(move |&x| x < width)
+/// The columns of a step, counted back from its end: the one in the middle, those in the middle of its halves, and the rest.
+const BACK: [usize; STEP] = [0, 4, 6, 2, 7, 5, 3, 1];
+
+/// The steps in which the pixels of a row come.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Steps {
+    /// Columns before the first one that belong to its step.
+    phase: usize,
 }
 
-/// How far to the left and to the right of column `x` the pixels are between which it lies; none for one that asks for itself.
-fn reach(x: usize) -> Option<usize> {
-    let reach = 1 << x.trailing_zeros().min(STEP.trailing_zeros());
-    (reach < STEP).then_some(reach)
+impl Steps {
+    /// Those of row `y`, which begin as if by chance.
+    pub fn of(y: usize) -> Self {
+        let mixed = (y as u64).wrapping_mul(0x9e37_79b9_7f4a_7c15);
+        Self { phase: (mixed >> 40) as usize % STEP }
+    }
+
+    /// The columns of the row, each after those between which it lies.
+    pub fn columns(self, width: usize) -> impl Iterator<Item = usize> {
+        let ends = (0..width + self.phase + STEP).step_by(STEP);
+        let columns = ends.flat_map(move |end| BACK.map(|back| end.checked_sub(back + self.phase)));
+        columns.flatten().filter(move |&x| x < width)
+    }
+
+    /// How far to the left and to the right of column `x` the pixels are between which it lies; none for one that is cast and
+    /// asks for itself.
+    fn reach(self, x: usize) -> Option<usize> {
+        let reach = 1 << (x + self.phase).trailing_zeros().min(STEP.trailing_zeros());
+        (reach < STEP).then_some(reach)
+    }
+}
+
+/// What the ray through pixel (x, y) meets, if the two of its `row` between which it lies show one surface of one instance; no
+/// ray is cast for it.
+pub(super) fn fill<R: CastCentres>(
+    row: &Row<'_>,
+    (x, y): (usize, usize),
+    steps: Steps,
+    view: &Projector,
+    rays: &R,
+    memory: &mut R::Memory,
+) -> Option<SurfaceSample> {
+    let reach = steps.reach(x)?;
+    let is_known = |x: &usize| *x < row.object.len() && row.object[*x] != UNKNOWN;
+    let known = |x: Option<usize>| x.filter(is_known).map(|x| row.sample(x));
+    let (left, right) = (known(x.checked_sub(reach))?, known(Some(x + reach))?);
+    let is_one = left.surface.instance == right.surface.instance
+        && (left.surface.primitive == right.surface.primitive || Tangent::new(left, view).may_lend(&right));
+    is_one.then(|| rays.nearest_of(x, y, [left, right].into_iter(), memory))?
 }
 
 /// Takes over into column `x` of `row`, where a ray has met `sample`, what the pixels between which it lies know of light, if
@@ -30,12 +73,13 @@ fn reach(x: usize) -> Option<usize> {
 pub(super) fn lend(
     row: &mut Row<'_>,
     x: usize,
+    steps: Steps,
     view: &Projector,
     sample: &SurfaceSample,
     rays: &impl CastCentres,
     ask: &mut [u32],
 ) {
-    let Some(reach) = reach(x) else { return };
+    let Some(reach) = steps.reach(x) else { return };
     let tangent = Tangent::new(*sample, view);
     let lends = |other: usize| other < row.object.len() && tangent.may_lend(&row.sample(other));
     let known = (x.checked_sub(reach).is_some_and(lends), lends(x + reach));
@@ -68,22 +112,36 @@ mod tests {
 
     #[test]
     fn each_column_comes_once_and_after_those_between_which_it_lies() {
-        for width in 1..40 {
-            let order: Vec<_> = columns(width).collect();
+        for (width, phase) in (1..40).flat_map(|width| (0..STEP).map(move |phase| (width, phase))) {
+            let steps = Steps { phase };
+            let order: Vec<_> = steps.columns(width).collect();
             let place = |x: usize| order.iter().position(|&other| other == x);
             assert_eq!(order.len(), width);
             for x in 0..width {
                 let own = place(x);
-                assert!(own.is_some(), "{x} of {width}");
-                let beside = reach(x).map_or([x, x], |reach| [x - reach, x + reach]);
-                assert!(beside.into_iter().filter(|&other| other < width).all(|other| place(other) <= own));
+                assert!(own.is_some(), "{x} of {width} from {phase}");
+                let beside =
+                    steps.reach(x).map_or([Some(x); 2], |reach| [x.checked_sub(reach), Some(x + reach)]);
+                let inside = beside.into_iter().flatten().filter(|&other| other < width);
+                assert!(inside.into_iter().all(|other| place(other) <= own));
             }
         }
     }
 
     #[test]
-    fn one_column_in_four_lies_between_none() {
-        let reaches: Vec<_> = (0..9).map(|x| reach(x).unwrap_or(0)).collect();
-        assert_eq!(reaches, [0, 1, 2, 1, 0, 1, 2, 1, 0]);
+    fn one_column_in_eight_lies_between_none() {
+        let reaches = |phase: usize| (0..9).map(move |x| Steps { phase }.reach(x).unwrap_or(0));
+        assert!(reaches(0).eq([0, 1, 2, 1, 4, 1, 2, 1, 0]));
+        assert!(reaches(3).eq([1, 4, 1, 2, 1, 0, 1, 2, 1]));
+    }
+
+    #[test]
+    fn rows_begin_anywhere_and_elsewhere_than_those_beside_them() {
+        let phases: Vec<_> = (0..64).map(|y| Steps::of(y).phase).collect();
+        for phase in 0..STEP {
+            let count = phases.iter().filter(|&&other| other == phase).count();
+            assert!((4..=12).contains(&count), "{count} of 64 begin {phase} columns before");
+        }
+        assert!(phases.windows(2).all(|two| two[0] != two[1]), "{phases:?}");
     }
 }

@@ -2,13 +2,13 @@
 //! lights that may have changed.
 
 use super::around::{Around, Lent, Trust, is_one_surface};
-use super::between;
+use super::between::{self, Steps};
 use super::buzz_buffer::{BuzzBuffer, Projector, Row, UNKNOWN};
 use super::centre::CastCentres;
 use super::moved::Askers;
 use super::shares::{carry, spare};
 use super::sources::Sources;
-use crate::frame::{PixelClass, RayCounts};
+use crate::frame::{PixelClass, RayCounts, SurfaceSample};
 use rayon::prelude::*;
 
 /// One pixel in so many, on either axis, is proven visible whatever is known about it.
@@ -76,12 +76,15 @@ impl<'a, R: CastCentres> Pass<'a, R> {
     /// Casts what is wanted at all pixels.
     pub fn cast(&self, new: &mut BuzzBuffer, bits: Bits<'_>) -> RayCounts {
         self.by_rows(new, bits, |y, row, bits, counts| {
-            between::columns(row.object.len()).for_each(|x| {
-                let known = row.object[x] != UNKNOWN;
-                if known && self.wants_proof((x, y), row) {
+            let (steps, mut memory) = (Steps::of(y), R::Memory::default());
+            steps.columns(row.object.len()).for_each(|x| {
+                let mut found = None;
+                if row.object[x] == UNKNOWN {
+                    found = self.fill((x, y), row, steps, &mut memory);
+                } else if self.wants_proof((x, y), row) {
                     self.forget_if_hidden(x, row, counts);
                 }
-                self.settle((x, y), row, self.of_pixel(bits, x), counts);
+                self.settle((x, y), row, found, self.of_pixel(bits, x), counts);
             });
         })
     }
@@ -94,7 +97,7 @@ impl<'a, R: CastCentres> Pass<'a, R> {
             let columns = pixels[first..].iter().map(|&pixel| pixel as usize - y * width);
             for x in columns.take_while(|&x| x < width) {
                 if self.forget_if_hidden(x, row, counts) {
-                    self.settle((x, y), row, self.of_pixel(bits, x), counts);
+                    self.settle((x, y), row, None, self.of_pixel(bits, x), counts);
                 }
             }
         })
@@ -135,6 +138,22 @@ impl<'a, R: CastCentres> Pass<'a, R> {
         self.trust == Trust::Proof || self.moves && has(NEAR_LOOKOUT) && (has(LOOKOUT) || grows())
     }
 
+    /// What an unknown pixel shows that has come into view with all around it, where its row says so.
+    fn fill(
+        &self,
+        (x, y): (usize, usize),
+        row: &mut Row<'_>,
+        steps: Steps,
+        memory: &mut R::Memory,
+    ) -> Option<SurfaceSample> {
+        let is_new =
+            self.trust == Trust::Neighbours && self.sources.is_nothing_around(row.object.len(), (x, y));
+        let found =
+            is_new.then(|| between::fill(row, (x, y), steps, self.view, self.rays, memory)).flatten()?;
+        row.class[x] = PixelClass::Filled;
+        Some(found)
+    }
+
     /// Whether something hides the sample of column `x`, which then is unknown.
     fn forget_if_hidden(&self, x: usize, row: &mut Row<'_>, counts: &mut RayCounts) -> bool {
         let hidden = self.rays.is_hidden(&row.sample(x), counts);
@@ -145,11 +164,12 @@ impl<'a, R: CastCentres> Pass<'a, R> {
         hidden
     }
 
-    /// Casts what is unknown, and asks the lights that have to be asked.
+    /// Casts what is unknown, unless it is `found` without a ray, and asks the lights that have to be asked.
     fn settle(
         &self,
         (x, y): (usize, usize),
         row: &mut Row<'_>,
+        found: Option<SurfaceSample>,
         (ask, doubt): Bits<'_>,
         counts: &mut RayCounts,
     ) {
@@ -159,7 +179,7 @@ impl<'a, R: CastCentres> Pass<'a, R> {
             rays.confirm(ask);
         }
         if row.object[x] == UNKNOWN {
-            let sample = rays.hit(x, y, counts);
+            let sample = found.unwrap_or_else(|| rays.hit(x, y, counts));
             row.put(x, view, &sample);
             row.lit_mut(x).fill(0);
             ask.fill(u32::MAX);
@@ -178,7 +198,7 @@ impl<'a, R: CastCentres> Pass<'a, R> {
             // What only lies around a pixel on which nothing landed is asked anew, but for shares, which a few rays confirm.
             let is_poor = if rays.has_shares() { lent == Lent::Nothing } else { lent != Lent::Cell };
             if certain.is_none() && is_poor && self.trust == Trust::Neighbours {
-                between::lend(row, x, view, &sample, rays, ask);
+                between::lend(row, x, Steps::of(y), view, &sample, rays, ask);
             } else if lent != Lent::Nothing {
                 spare((x, y), self.trust, rays, ask);
             }

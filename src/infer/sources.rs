@@ -82,6 +82,13 @@ impl Sources {
         (source != NOTHING).then_some(source as usize)
     }
 
+    /// True if nothing landed on pixel (x, y) of an image so wide, nor on any around it.
+    pub fn is_nothing_around(&self, width: usize, (x, y): (usize, usize)) -> bool {
+        let (columns, height) = (x.saturating_sub(1)..(x + 2).min(width), self.landed.len() / width);
+        let mut rows = y.saturating_sub(1)..(y + 2).min(height);
+        rows.all(|y| self.row(width, y, columns.clone()).iter().all(|source| source & NOTHING == NOTHING))
+    }
+
     /// True if a sample landed on the pixel's very centre.
     pub fn is_centred(&self, pixel: usize) -> bool {
         self.of(pixel).is_some() && self.landed[pixel] & MOVED == 0

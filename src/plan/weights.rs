@@ -11,11 +11,13 @@ pub const SHADOW_RAY: f64 = 0.8;
 
 /// How a quality's inferred frames are predicted.
 ///
-/// Of a frame `new = outside + hidden + contested * c + stretched * s + edges * e + moved * m` is traced whatever came before.
+/// Of a frame `new = outside * o + hidden + contested * c + stretched * s + edges * e + moved * m` is traced whatever came before.
 /// Samples that are pushed on from frame to frame lose their order: a step takes them so far towards a random pattern,
 /// in which a share of the pixels is missed. What is traced is in order again.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Weights {
+    /// Share of [`Change::outside`] that is traced.
+    pub outside: f64,
     /// Share of [`Change::contested`] that is traced.
     pub contested: f64,
     /// Share of [`Change::stretched`] that is traced.
@@ -41,6 +43,7 @@ pub struct Weights {
 impl Weights {
     /// Of [`Quality::HalfPixel`]: nothing is cast at edges, but samples scatter.
     pub const HALF_PIXEL: Self = Self {
+        outside: 1.0,
         contested: 1.0,
         stretched: 1.0,
         edges: 0.0,
@@ -53,11 +56,13 @@ impl Weights {
         proof: 0.0,
     };
 
-    /// Of [`Quality::Centred`]: edges are cast in every frame that moves, holes within surfaces are filled, no area is contested.
+    /// Of [`Quality::Centred`]: edges are cast in every frame that moves, holes within surfaces are filled, and so is most of what
+    /// comes into the image; no area is contested.
     pub const CENTRED: Self = Self {
+        outside: 0.45,
         contested: 0.0,
         stretched: 0.0,
-        edges: 0.77,
+        edges: 0.78,
         moved: 0.5,
         missed: 0.0,
         scatter: 0.0,
@@ -72,7 +77,8 @@ impl Weights {
         match quality {
             Quality::Full | Quality::HalfPixel => Self::HALF_PIXEL,
             Quality::Centred => Self::CENTRED,
-            Quality::Verified => Self { proof: 1.0, ..Self::CENTRED },
+            // What is not proven is not filled in.
+            Quality::Verified => Self { outside: 1.0, proof: 1.0, ..Self::CENTRED },
         }
     }
 
@@ -80,7 +86,7 @@ impl Weights {
     pub fn traced(self, changes: impl IntoIterator<Item = Change>) -> impl Iterator<Item = f64> {
         let mut disorder = 0.0;
         changes.into_iter().map(move |c| {
-            let new = c.outside
+            let new = self.outside * c.outside
                 + c.hidden
                 + self.contested * c.contested
                 + self.stretched * c.stretched

