@@ -268,6 +268,12 @@ impl<'a> Tangent<'a> {
     }
 }
 
+/// True where two samples lie on one triangle, or on one smooth surface of one instance.
+pub(super) fn is_one_sheet(a: &SurfaceSample, b: &SurfaceSample, view: &Projector) -> bool {
+    a.surface.instance == b.surface.instance
+        && (a.surface.primitive == b.surface.primitive || Tangent::new(*a, view).may_lend(b))
+}
+
 /// True where two samples lie on one surface, with no step between them.
 pub fn is_one_surface(a: &SurfaceSample, b: &SurfaceSample, view: &Projector) -> bool {
     Tangent::new(*a, view).reaches(b)

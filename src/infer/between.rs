@@ -8,7 +8,7 @@
 //! A pixel is filled so only if nothing landed around it either: elsewhere an outline is near. What is too narrow for one row is
 //! met in another, whose steps begin elsewhere, and from there [followed](super::outlines).
 
-use super::around::Tangent;
+use super::around::{Tangent, is_one_sheet};
 use super::buzz_buffer::{Projector, Row, UNKNOWN};
 use super::centre::CastCentres;
 use crate::frame::SurfaceSample;
@@ -62,9 +62,7 @@ pub(super) fn fill<R: CastCentres>(
     let is_known = |x: &usize| *x < row.object.len() && row.object[*x] != UNKNOWN;
     let known = |x: Option<usize>| x.filter(is_known).map(|x| row.sample(x));
     let (left, right) = (known(x.checked_sub(reach))?, known(Some(x + reach))?);
-    let is_one = left.surface.instance == right.surface.instance
-        && (left.surface.primitive == right.surface.primitive || Tangent::new(left, view).may_lend(&right));
-    is_one.then(|| rays.nearest_of(x, y, [left, right].into_iter(), memory))?
+    is_one_sheet(&left, &right, view).then(|| rays.nearest_of(x, y, [left, right].into_iter(), memory))?
 }
 
 /// Takes over into column `x` of `row`, where a ray has met `sample`, what the pixels between which it lies know of light, if

@@ -96,7 +96,13 @@ impl<'a, R: CastCentres> Pass<'a, R> {
             let first = pixels.partition_point(|&pixel| (pixel as usize) < y * width);
             let columns = pixels[first..].iter().map(|&pixel| pixel as usize - y * width);
             for x in columns.take_while(|&x| x < width) {
-                if self.forget_if_hidden(x, row, counts) {
+                if self.is_new(y * width + x) {
+                    row.class[x] = PixelClass::Missed;
+                    row.object[x] = UNKNOWN;
+                } else {
+                    self.forget_if_hidden(x, row, counts);
+                }
+                if row.object[x] == UNKNOWN {
                     self.settle((x, y), row, None, self.of_pixel(bits, x), counts);
                 }
             }
@@ -138,6 +144,12 @@ impl<'a, R: CastCentres> Pass<'a, R> {
         self.trust == Trust::Proof || self.moves && has(NEAR_LOOKOUT) && (has(LOOKOUT) || grows())
     }
 
+    /// True if nothing landed on a pixel, nor on any around it.
+    pub fn is_new(&self, pixel: usize) -> bool {
+        let width = self.old.width();
+        self.sources.is_nothing_around(width, (pixel % width, pixel / width))
+    }
+
     /// What an unknown pixel shows that has come into view with all around it, where its row says so.
     fn fill(
         &self,
@@ -146,8 +158,7 @@ impl<'a, R: CastCentres> Pass<'a, R> {
         steps: Steps,
         memory: &mut R::Memory,
     ) -> Option<SurfaceSample> {
-        let is_new =
-            self.trust == Trust::Neighbours && self.sources.is_nothing_around(row.object.len(), (x, y));
+        let is_new = self.trust == Trust::Neighbours && self.is_new(y * row.object.len() + x);
         let found =
             is_new.then(|| between::fill(row, (x, y), steps, self.view, self.rays, memory)).flatten()?;
         row.class[x] = PixelClass::Filled;

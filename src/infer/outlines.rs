@@ -8,7 +8,7 @@
 //! where it is hidden, a ray is cast there, and the pixels around are looked at again, until the new object has been
 //! followed to its end.
 
-use super::around::is_one_surface;
+use super::around::{is_one_sheet, is_one_surface};
 use super::buzz_buffer::{BuzzBuffer, pixels_around};
 use super::cast::Pass;
 use super::centre::CastCentres;
@@ -65,7 +65,7 @@ fn is_all_reused(buffer: &BuzzBuffer, stretch: &Range<usize>) -> bool {
 
 /// True if a reused sample may be hidden by what a ray has met at a pixel beside it: something that stands before it and is of no
 /// surface that landed around it.
-fn may_be_hidden<R>(pass: &Pass<'_, R>, buffer: &BuzzBuffer, pixel: usize) -> bool {
+fn may_be_hidden<R: CastCentres>(pass: &Pass<'_, R>, buffer: &BuzzBuffer, pixel: usize) -> bool {
     let around = || pixels_around(buffer.width(), buffer.height(), pixel);
     let is_unknown = |met: usize| {
         let sample = buffer.sample(met);
@@ -80,9 +80,16 @@ fn may_be_hidden<R>(pass: &Pass<'_, R>, buffer: &BuzzBuffer, pixel: usize) -> bo
             && buffer.z[met] < buffer.z[pixel]
             && !buffer.is_same_primitive(met, pixel)
     };
-    buffer.class[pixel].is_reused()
-        && is_beside_met(buffer, pixel)
-        && around().any(|met| stands_before(met) && is_unknown(met))
+    if !buffer.class[pixel].is_reused() || !is_beside_met(buffer, pixel) {
+        return false;
+    }
+    if pass.is_new(pixel) {
+        let own = buffer.sample(pixel);
+        return around().any(|met| {
+            !buffer.class[met].is_reused() && !is_one_sheet(&own, &buffer.sample(met), pass.view)
+        });
+    }
+    around().any(|met| stands_before(met) && is_unknown(met))
 }
 
 /// True if a ray was cast at any of the nine pixels around and at `pixel`.
