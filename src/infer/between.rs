@@ -33,11 +33,17 @@ impl Steps {
         Self { phase: (mixed >> 40) as usize % STEP }
     }
 
-    /// The columns of the row, each after those between which it lies.
-    pub fn columns(self, width: usize) -> impl Iterator<Item = usize> {
-        let ends = (0..width + self.phase + STEP).step_by(STEP);
-        let columns = ends.flat_map(move |end| BACK.map(|back| end.checked_sub(back + self.phase)));
-        columns.flatten().filter(move |&x| x < width)
+    /// Visits the columns of a row so wide, each after those between which it lies.
+    pub fn columns(self, width: usize, mut visit: impl FnMut(usize)) {
+        for end in (0..width + self.phase + STEP).step_by(STEP) {
+            for back in BACK {
+                // Columns before the first one wrap around and are beyond the last.
+                let x = end.wrapping_sub(back + self.phase);
+                if x < width {
+                    visit(x);
+                }
+            }
+        }
     }
 
     /// How far to the left and to the right of column `x` the pixels are between which it lies; none for one that is cast and
@@ -112,7 +118,8 @@ mod tests {
     fn each_column_comes_once_and_after_those_between_which_it_lies() {
         for (width, phase) in (1..40).flat_map(|width| (0..STEP).map(move |phase| (width, phase))) {
             let steps = Steps { phase };
-            let order: Vec<_> = steps.columns(width).collect();
+            let mut order = Vec::new();
+            steps.columns(width, |x| order.push(x));
             let place = |x: usize| order.iter().position(|&other| other == x);
             assert_eq!(order.len(), width);
             for x in 0..width {

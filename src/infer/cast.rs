@@ -77,19 +77,21 @@ impl<'a, R: CastCentres> Pass<'a, R> {
     pub fn cast(&self, new: &mut BuzzBuffer, bits: Bits<'_>) -> RayCounts {
         self.by_rows(new, bits, |y, row, bits, counts| {
             let (steps, mut memory) = (Steps::of(y), R::Memory::default());
-            steps.columns(row.object.len()).for_each(|x| {
-                let mut found = None;
-                if row.object[x] == UNKNOWN {
-                    found = self.fill((x, y), row, steps, &mut memory);
-                } else if self.wants_proof((x, y), row) {
+            steps.columns(row.object.len(), |x| {
+                if row.object[x] != UNKNOWN && self.wants_proof((x, y), row) {
                     self.forget_if_hidden(x, row, counts);
                 }
-                self.settle((x, y), row, found, self.of_pixel(bits, x), counts);
+                if row.object[x] == UNKNOWN {
+                    let found = self.fill((x, y), row, steps, &mut memory);
+                    self.see((x, y), row, found, self.of_pixel(bits, x), counts);
+                }
+                self.ask((x, y), row, self.of_pixel(bits, x), counts);
             });
         })
     }
 
-    /// Proves the samples of `pixels`, which are in order, visible, and casts those that are hidden.
+    /// Proves the samples of `pixels`, which are in order, visible, and casts those that are hidden, or were only filled in between
+    /// others.
     pub fn prove(&self, new: &mut BuzzBuffer, pixels: &[u32], bits: Bits<'_>) -> RayCounts {
         let width = self.old.width();
         self.by_rows(new, bits, |y, row, bits, counts| {
@@ -103,7 +105,8 @@ impl<'a, R: CastCentres> Pass<'a, R> {
                     self.forget_if_hidden(x, row, counts);
                 }
                 if row.object[x] == UNKNOWN {
-                    self.settle((x, y), row, None, self.of_pixel(bits, x), counts);
+                    self.see((x, y), row, None, self.of_pixel(bits, x), counts);
+                    self.ask((x, y), row, self.of_pixel(bits, x), counts);
                 }
             }
         })
@@ -165,18 +168,18 @@ impl<'a, R: CastCentres> Pass<'a, R> {
         Some(found)
     }
 
-    /// Whether something hides the sample of column `x`, which then is unknown.
-    fn forget_if_hidden(&self, x: usize, row: &mut Row<'_>, counts: &mut RayCounts) -> bool {
-        let hidden = self.rays.is_hidden(&row.sample(x), counts);
-        if hidden {
+    /// Makes the sample of column `x` unknown if something hides it.
+    fn forget_if_hidden(&self, x: usize, row: &mut Row<'_>, counts: &mut RayCounts) {
+        if self.rays.is_hidden(&row.sample(x), counts) {
             row.class[x] = PixelClass::Bad;
             row.object[x] = UNKNOWN;
         }
-        hidden
     }
 
-    /// Casts what is unknown, unless it is `found` without a ray, and asks the lights that have to be asked.
-    fn settle(
+    /// Casts a pixel that is unknown, unless what it shows is `found` already, and finds out what is known around it of its lights.
+    // Few pixels come here; the others are done with sooner if this stays out of their way.
+    #[inline(never)]
+    fn see(
         &self,
         (x, y): (usize, usize),
         row: &mut Row<'_>,
@@ -185,38 +188,40 @@ impl<'a, R: CastCentres> Pass<'a, R> {
         counts: &mut RayCounts,
     ) {
         let (old, view, rays) = (self.old, self.view, self.rays);
-        let pixel = y * old.width() + x;
+        let sample = found.unwrap_or_else(|| rays.hit(x, y, counts));
+        row.put(x, view, &sample);
+        row.lit_mut(x).fill(0);
+        ask.fill(u32::MAX);
+        let own = self.sources.of(y * old.width() + x);
+        let certain = own.filter(|&i| is_one_surface(&sample, &old.sample(i), view));
+        let mut lent = Lent::Nothing;
+        if found.is_none() && (certain.is_some() || rays.has_shares() || self.trust == Trust::Neighbours) {
+            let around = Around::new(old, view, self.sources, (x, y), 2);
+            lent = around.lend(&sample, rays, (self.trust, certain.is_some()), row.lit_mut(x), ask);
+            if let Some(i) = certain
+                && rays.has_shares()
+            {
+                carry((old, i), view, (x, y), &sample, rays, (row.lit_mut(x), ask));
+            }
+        }
+        // What only lies around a pixel on which nothing landed is asked anew, but for shares, which a few rays confirm.
+        let is_poor = if rays.has_shares() { lent == Lent::Nothing } else { lent != Lent::Cell };
+        if certain.is_none() && is_poor && self.trust == Trust::Neighbours {
+            between::lend(row, x, Steps::of(y), view, &sample, rays, ask);
+        } else if lent != Lent::Nothing {
+            spare((x, y), self.trust, rays, ask);
+        }
+        doubt.fill(if lent == Lent::Cell { 0 } else { u32::MAX });
+    }
+
+    /// Asks the lights that have to be asked.
+    fn ask(&self, (x, y): (usize, usize), row: &mut Row<'_>, (ask, doubt): Bits<'_>, counts: &mut RayCounts) {
+        let rays = self.rays;
         if self.moves && rays.has_shares() && self.grid.has((x, y), RENEWED) {
             rays.confirm(ask);
         }
-        if row.object[x] == UNKNOWN {
-            let sample = found.unwrap_or_else(|| rays.hit(x, y, counts));
-            row.put(x, view, &sample);
-            row.lit_mut(x).fill(0);
-            ask.fill(u32::MAX);
-            let own = self.sources.of(pixel);
-            let certain = own.filter(|&i| is_one_surface(&sample, &old.sample(i), view));
-            let mut lent = Lent::Nothing;
-            if certain.is_some() || rays.has_shares() || self.trust == Trust::Neighbours {
-                let around = Around::new(old, view, self.sources, (x, y), 2);
-                lent = around.lend(&sample, rays, (self.trust, certain.is_some()), row.lit_mut(x), ask);
-                if let Some(i) = certain
-                    && rays.has_shares()
-                {
-                    carry((old, i), view, (x, y), &sample, rays, (row.lit_mut(x), ask));
-                }
-            }
-            // What only lies around a pixel on which nothing landed is asked anew, but for shares, which a few rays confirm.
-            let is_poor = if rays.has_shares() { lent == Lent::Nothing } else { lent != Lent::Cell };
-            if certain.is_none() && is_poor && self.trust == Trust::Neighbours {
-                between::lend(row, x, Steps::of(y), view, &sample, rays, ask);
-            } else if lent != Lent::Nothing {
-                spare((x, y), self.trust, rays, ask);
-            }
-            doubt.fill(if lent == Lent::Cell { 0 } else { u32::MAX });
-        }
         // Its lights were asked when it was cast, or since.
-        let settled = self.sources.is_centred(pixel) && ask.iter().all(|&bits| bits == 0);
+        let settled = self.sources.is_centred(y * self.old.width() + x) && ask.iter().all(|&bits| bits == 0);
         if let Some(askers) = &self.askers {
             askers.ask(&row.sample(x), row.lit_mut(x), ask);
         }

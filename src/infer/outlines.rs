@@ -13,7 +13,7 @@ use super::buzz_buffer::{BuzzBuffer, pixels_around};
 use super::cast::Pass;
 use super::centre::CastCentres;
 use super::frontier::Frontier;
-use crate::frame::RayCounts;
+use crate::frame::{PixelClass, RayCounts};
 use std::ops::Range;
 
 /// What following holds between frames beside its frontier, so that nothing is allocated for each.
@@ -38,7 +38,7 @@ impl Outlines {
         let mut counts = RayCounts::default();
         self.proven.clear();
         self.proven.resize(buffer.object.len(), false);
-        let is_even = |stretch| is_all_reused(buffer, &stretch);
+        let is_even = |stretch| is_all_reused(buffer, &stretch) || is_one_triangle(buffer, &stretch);
         frontier.begin(buffer, is_even, |pixel| may_be_hidden(pass, buffer, pixel));
         while !frontier.pixels().is_empty() && !pass.rays.is_cancelled() {
             counts += pass.prove(buffer, frontier.pixels(), (ask, doubt));
@@ -54,13 +54,24 @@ impl Outlines {
 
 /// True if the pixels of a stretch within a row, and all around them, are reused: nothing was met there.
 fn is_all_reused(buffer: &BuzzBuffer, stretch: &Range<usize>) -> bool {
+    rows_around(buffer, stretch).all(|row| {
+        let classes = &buffer.class[row];
+        classes.iter().fold(true, |all, class| all & class.is_reused())
+    })
+}
+
+/// True if they all show one triangle: nothing stands before another.
+fn is_one_triangle(buffer: &BuzzBuffer, stretch: &Range<usize>) -> bool {
+    rows_around(buffer, stretch).all(|mut row| row.all(|i| buffer.is_same_primitive(i, stretch.start)))
+}
+
+/// The pixels of a stretch within a row, and all around them, row by row.
+fn rows_around(buffer: &BuzzBuffer, stretch: &Range<usize>) -> impl Iterator<Item = Range<usize>> {
     let (width, height) = (buffer.width(), buffer.height());
     let (x, y) = (stretch.start % width, stretch.start / width);
     let columns = x.saturating_sub(1)..(x + stretch.len() + 1).min(width);
-    (y.saturating_sub(1)..=(y + 1).min(height - 1)).all(|y| {
-        let classes = &buffer.class[y * width..][columns.clone()];
-        classes.iter().fold(true, |all, class| all & class.is_reused())
-    })
+    let rows = y.saturating_sub(1)..(y + 2).min(height);
+    rows.map(move |y| y * width + columns.start..y * width + columns.end)
 }
 
 /// True if a reused sample may be hidden by what a ray has met at a pixel beside it: something that stands before it and is of no
@@ -83,10 +94,10 @@ fn may_be_hidden<R: CastCentres>(pass: &Pass<'_, R>, buffer: &BuzzBuffer, pixel:
     if !buffer.class[pixel].is_reused() || !is_beside_met(buffer, pixel) {
         return false;
     }
-    if pass.is_new(pixel) {
-        let own = buffer.sample(pixel);
+    if buffer.class[pixel] == PixelClass::Filled && pass.is_new(pixel) {
+        let is_other = |met: usize| !is_one_sheet(&buffer.sample(pixel), &buffer.sample(met), pass.view);
         return around().any(|met| {
-            !buffer.class[met].is_reused() && !is_one_sheet(&own, &buffer.sample(met), pass.view)
+            !buffer.class[met].is_reused() && !buffer.is_same_primitive(met, pixel) && is_other(met)
         });
     }
     around().any(|met| stands_before(met) && is_unknown(met))

@@ -97,6 +97,7 @@ impl<'a> SurfaceInteraction<'a> {
     }
 
     /// The shading normal that the normal map says; `tangent` has the sign of the bitangent beside it.
+    #[inline(always)]
     fn mapped(&self, map: &NormalTexture, tangent: Option<(Vec3, f32)>) -> Vec3 {
         let sampled = self.texture(&map.texture);
         let x = (sampled.x * 2.0 - 1.0) * map.scale;
@@ -127,11 +128,14 @@ impl<'a> SurfaceInteraction<'a> {
         (along_u, if normal.cross(along_u).dot(along_v) > 0.0 { -1.0 } else { 1.0 })
     }
 
+    #[inline]
     fn coordinates_of(&self, set: usize) -> TextureCoordinates {
         if set == 0 { self.uv } else { self.coordinates(set) }
     }
 
     /// A set of texture coordinates; all zero where the mesh has no such set.
+    // What is handed on in memory, in parts, is waited for.
+    #[inline(always)]
     fn coordinates(&self, set: usize) -> TextureCoordinates {
         let Some(uvs) = self.point.mesh.uvs.get(set).filter(|uvs| !uvs.is_empty()) else {
             return TextureCoordinates::default();
