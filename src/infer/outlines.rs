@@ -7,6 +7,9 @@
 //! stands before its neighbour and that nothing around that neighbour knows of, the neighbour is to be proven visible;
 //! where it is hidden, a ray is cast there, and the pixels around are looked at again, until the new object has been
 //! followed to its end.
+//!
+//! Of what has come into view nothing is known, and most of it is only filled in [between](super::between) pixels of its row that
+//! were cast. So there a ray is cast wherever one beside it has met another surface, before it or not.
 
 use super::around::{is_one_sheet, is_one_surface};
 use super::buzz_buffer::{BuzzBuffer, pixels_around};
@@ -75,7 +78,7 @@ fn rows_around(buffer: &BuzzBuffer, stretch: &Range<usize>) -> impl Iterator<Ite
 }
 
 /// True if a reused sample may be hidden by what a ray has met at a pixel beside it: something that stands before it and is of no
-/// surface that landed around it.
+/// surface that landed around it. Where none did, anything that is not of its own surface.
 fn may_be_hidden<R: CastCentres>(pass: &Pass<'_, R>, buffer: &BuzzBuffer, pixel: usize) -> bool {
     let around = || pixels_around(buffer.width(), buffer.height(), pixel);
     let is_unknown = |met: usize| {

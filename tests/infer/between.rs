@@ -8,9 +8,8 @@ const NEW: std::ops::Range<usize> = 5..SIDE as usize;
 
 /// For each row, the columns among the new ones that were cast, and those that asked for the light. All show what a ray would
 /// meet, under the light that reaches it.
-fn cast_and_asked(card_ends: f64, light_ends: f64) -> Vec<[Vec<usize>; 2]> {
-    let stage = Stage { card_ends, light_ends };
-    let (new, eye) = infer(&stage, 6.0);
+fn cast_and_asked(stage: &Stage) -> Vec<[Vec<usize>; 2]> {
+    let (new, eye) = infer(stage, 6.0);
     let side = SIDE as usize;
     for i in 0..side * side {
         let (x, y) = (i % side, i / side);
@@ -30,7 +29,7 @@ fn cast_and_asked(card_ends: f64, light_ends: f64) -> Vec<[Vec<usize>; 2]> {
 #[test]
 fn a_few_pixels_are_cast_and_ask_where_all_is_one_surface_lit_alike() {
     for light_ends in [f64::INFINITY, f64::NEG_INFINITY] {
-        let rows = cast_and_asked(f64::INFINITY, light_ends);
+        let rows = cast_and_asked(&Stage { card_ends: f64::INFINITY, light_ends, strip: f64::NAN });
         for [cast, asked] in &rows {
             // At most the end of a step, and those that are alone because what is beside them is outside the image.
             assert!((1..=3).contains(&cast.len()), "{rows:?}");
@@ -44,9 +43,18 @@ fn a_few_pixels_are_cast_and_ask_where_all_is_one_surface_lit_alike() {
 fn an_edge_is_found_between_pixels_that_disagree() {
     // Column x shows the card at 1.5 + x: both edges lie between columns 6 and 7.
     for (card_ends, light_ends) in [(f64::INFINITY, 8.0), (8.0, f64::INFINITY)] {
-        for [cast, asked] in cast_and_asked(card_ends, light_ends) {
+        for [cast, asked] in cast_and_asked(&Stage { card_ends, light_ends, strip: f64::NAN }) {
             let beside = if card_ends.is_finite() { &cast } else { &asked };
             assert!(beside.contains(&6) && beside.contains(&7), "{cast:?}, {asked:?}");
         }
+    }
+}
+
+#[test]
+fn what_is_narrower_than_a_step_is_met_in_some_row_and_followed_through_the_others() {
+    // Column x shows the card at 1.5 + x.
+    let strip = 8.0;
+    for [cast, _] in cast_and_asked(&Stage { card_ends: f64::INFINITY, light_ends: f64::INFINITY, strip }) {
+        assert!(cast.contains(&7), "{cast:?}");
     }
 }

@@ -8,7 +8,7 @@ use buzz::infer::CastCentres;
 fn the_inside_of_an_outline_is_not_cast_and_what_it_may_have_come_over_is() {
     // The last column of the card is the fifth, number 4. From the left the card moves right, over the wall; from
     // the right it goes away, and what would have come with it was wall.
-    let stage = Stage { card_ends: 0.0, light_ends: f64::INFINITY };
+    let stage = Stage { card_ends: 0.0, light_ends: f64::INFINITY, strip: f64::NAN };
     for (x, card, wall) in
         [(-0.3, PixelClass::Good, PixelClass::Edge), (0.3, PixelClass::Edge, PixelClass::Good)]
     {
@@ -25,7 +25,7 @@ fn the_inside_of_an_outline_is_not_cast_and_what_it_may_have_come_over_is() {
 fn an_outline_that_passes_a_centre_is_met() {
     // The card has gone from the fifth column, and has come to the sixth.
     for (x, seen) in [(0.8, [CARD.0, WALL.0, WALL.0]), (-0.8, [CARD.0, CARD.0, CARD.0])] {
-        let (new, eye) = infer(&Stage { card_ends: 0.0, light_ends: f64::INFINITY }, x);
+        let (new, eye) = infer(&Stage { card_ends: 0.0, light_ends: f64::INFINITY, strip: f64::NAN }, x);
         for y in 2..8 {
             let object = |x: usize| new.object[y * SIDE as usize + x];
             assert_eq!([object(3), object(4), object(5)], seen, "from {x}, row {y}");
@@ -38,7 +38,7 @@ fn an_outline_that_passes_a_centre_is_met() {
 #[test]
 fn the_light_is_asked_for_only_beside_a_shadows_edge() {
     // All is card; the light ends in the middle of it, and the card moves by 0.3 pixels.
-    let stage = Stage { card_ends: f64::INFINITY, light_ends: 0.0 };
+    let stage = Stage { card_ends: f64::INFINITY, light_ends: 0.0, strip: f64::NAN };
     // The edge was between the old columns 4 and 5; whose centre is between them now asks, whichever side it carries.
     for (x, straddles) in [(-0.3, 5), (0.3, 4)] {
         let (new, eye) = infer(&stage, x);
@@ -58,7 +58,7 @@ fn the_light_is_asked_for_only_beside_a_shadows_edge() {
 
 #[test]
 fn a_pixel_that_is_cast_takes_the_light_of_the_cell_that_it_was_in() {
-    let stage = Stage { card_ends: 0.0, light_ends: f64::INFINITY };
+    let stage = Stage { card_ends: 0.0, light_ends: f64::INFINITY, strip: f64::NAN };
     let (new, eye) = infer(&stage, -0.3);
     let asked = eye.asked.lock().unwrap();
     for y in 2..8usize {

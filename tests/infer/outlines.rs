@@ -4,12 +4,12 @@ use crate::stage::{CARD, SIDE, Stage, WALL, infer_change};
 use buzz::frame::PixelClass;
 
 /// All lit; the card ends between the columns 4 and 5.
-const WITH_CARD: Stage = Stage { card_ends: 0.0, light_ends: f64::INFINITY };
+const WITH_CARD: Stage = Stage { card_ends: 0.0, light_ends: f64::INFINITY, strip: f64::NAN };
 
 #[test]
 fn what_comes_in_at_a_side_is_followed_to_its_end() {
     // Only the wall was seen. It moves by 0.03 pixels, so that no pixel is missed; but the first column was outside.
-    let empty = Stage { card_ends: f64::NEG_INFINITY, light_ends: f64::INFINITY };
+    let empty = Stage { card_ends: f64::NEG_INFINITY, light_ends: f64::INFINITY, strip: f64::NAN };
     let (new, _, counts) = infer_change(&empty, &WITH_CARD, -0.3);
     for y in 0..SIDE as usize {
         let pixel = |x: usize| y * SIDE as usize + x;

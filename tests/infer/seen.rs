@@ -22,7 +22,7 @@ fn lit(stage: &Stage, plane: (u32, f64), at: [f64; 2], turn: impl Fn(&mut Surfac
 #[test]
 fn what_is_seen_is_known_to_be_lit_or_not() {
     // The card fills the image; the light ends between the columns 4 and 5.
-    let stage = Stage { card_ends: f64::INFINITY, light_ends: 0.0 };
+    let stage = Stage { card_ends: f64::INFINITY, light_ends: 0.0, strip: f64::NAN };
     let known = |x: f64, y: f64| lit(&stage, CARD, [x, y], |_| {});
     assert_eq!([known(3.2, 5.0), known(4.4, 5.7)], [Some(1); 2]);
     assert_eq!([known(5.6, 5.0), known(8.0, 2.3)], [Some(0); 2]);
@@ -32,7 +32,7 @@ fn what_is_seen_is_known_to_be_lit_or_not() {
 
 #[test]
 fn nothing_is_known_of_what_is_hidden_or_turned_away() {
-    let stage = Stage { card_ends: 0.0, light_ends: f64::INFINITY };
+    let stage = Stage { card_ends: 0.0, light_ends: f64::INFINITY, strip: f64::NAN };
     let known = |plane, x: f64| lit(&stage, plane, [x, 5.0], |_| {});
     assert_eq!([known(CARD, 3.0), known(WALL, 8.0)], [Some(1); 2]);
     // Behind the card, and at its end.

@@ -13,10 +13,14 @@ pub const SIDE: u32 = 10;
 pub struct Stage {
     pub card_ends: f64,
     pub light_ends: f64,
+    /// Where a strip begins that is glued to the card, a pixel wide; nowhere if not a number.
+    pub strip: f64,
 }
 
 pub const CARD: (u32, f64) = (1, 1.0);
 pub const WALL: (u32, f64) = (2, 10.0);
+/// Another instance of the card's object.
+const STRIP: (u32, f64) = (3, 0.98);
 
 /// The eye of a view before a stage; remembers which pixels asked for the light.
 pub struct Eye<'a> {
@@ -41,7 +45,7 @@ impl<'a> Eye<'a> {
         SurfaceSample {
             position: position.as_vec3(),
             surface: SurfaceRef { instance: object, primitive: 0, u: 0.25, v: 0.5 },
-            object,
+            object: if object == STRIP.0 { CARD.0 } else { object },
             normal: PackedNormal::new(Vec3::Z),
         }
     }
@@ -49,6 +53,9 @@ impl<'a> Eye<'a> {
     /// What is at the centre of a pixel.
     pub fn meet(&self, x: usize, y: usize) -> SurfaceSample {
         let card = self.met(CARD, x, y);
+        if (0.0..1.0).contains(&(f64::from(card.position.x) - self.stage.strip)) {
+            return self.met(STRIP, x, y);
+        }
         if f64::from(card.position.x) < self.stage.card_ends { card } else { self.met(WALL, x, y) }
     }
 
@@ -92,7 +99,8 @@ impl CastCentres for Eye<'_> {
         (): &mut (),
     ) -> Option<SurfaceSample> {
         // The card is met wherever it may reach: what a candidate names has no end.
-        let planes = candidates.map(|c| if c.object == CARD.0 { CARD } else { WALL });
+        let plane = |instance: u32| [CARD, WALL, STRIP].into_iter().find(|plane| plane.0 == instance);
+        let planes = candidates.filter_map(|c| plane(c.surface.instance));
         planes.min_by(|a, b| a.1.total_cmp(&b.1)).map(|plane| self.met(plane, x, y))
     }
 
