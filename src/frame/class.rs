@@ -25,7 +25,7 @@ pub enum PixelClass {
     Edge = 7,
     /// Something moved in front; traced.
     Moved = 8,
-    /// A hole inside a surface, resolved from its neighbours; reused.
+    /// None landed here; resolved from its neighbours, inside a surface or between pixels of its row that were cast; reused.
     Filled = 9,
 }
 
