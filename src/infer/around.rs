@@ -242,12 +242,12 @@ impl<'a> Tangent<'a> {
         (other.normal == self.sample.normal || faces_alike()) && self.reaches(other)
     }
 
-    /// True if a pixel of `buffer` may lend, and shows the same instance: the bars of a window and the panes behind them are two
-    /// things, though they are within a pixel's width.
-    pub fn may_borrow_from(&self, buffer: &BuzzBuffer, pixel: usize) -> bool {
-        let (surface, own) = (buffer.surface[pixel], self.sample.surface);
-        let is_same_face = surface.primitive == own.primitive && buffer.normal[pixel] == self.sample.normal;
-        surface.instance == own.instance && (is_same_face || self.may_lend(&buffer.sample(pixel)))
+    /// True if `other` may lend, and is of the same instance: the bars of a window and the panes behind them are two things,
+    /// though they are within a pixel's width.
+    pub fn is_one_thing_with(&self, other: &SurfaceSample) -> bool {
+        let own = &self.sample;
+        let is_same_face = other.surface.primitive == own.surface.primitive && other.normal == own.normal;
+        other.surface.instance == own.surface.instance && (is_same_face || self.may_lend(other))
     }
 
     /// See [`is_one_surface`].
@@ -266,12 +266,6 @@ impl<'a> Tangent<'a> {
             off <= step || between.dot(other.normal.get()).abs() <= step
         }
     }
-}
-
-/// True where two samples lie on one triangle, or on one smooth surface of one instance.
-pub(super) fn is_one_sheet(a: &SurfaceSample, b: &SurfaceSample, view: &Projector) -> bool {
-    a.surface.instance == b.surface.instance
-        && (a.surface.primitive == b.surface.primitive || Tangent::new(*a, view).may_lend(b))
 }
 
 /// True where two samples lie on one surface, with no step between them.

@@ -8,7 +8,7 @@
 //! A pixel is filled so only if nothing landed around it either: elsewhere an outline is near. What is too narrow for one row is
 //! met in another, whose steps begin elsewhere, and from there [followed](super::outlines).
 
-use super::around::{Tangent, is_one_sheet};
+use super::around::Tangent;
 use super::buzz_buffer::{Projector, Row, UNKNOWN};
 use super::centre::CastCentres;
 use crate::frame::SurfaceSample;
@@ -68,7 +68,8 @@ pub(super) fn fill<R: CastCentres>(
     let is_known = |x: &usize| *x < row.object.len() && row.object[*x] != UNKNOWN;
     let known = |x: Option<usize>| x.filter(is_known).map(|x| row.sample(x));
     let (left, right) = (known(x.checked_sub(reach))?, known(Some(x + reach))?);
-    is_one_sheet(&left, &right, view).then(|| rays.nearest_of(x, y, [left, right].into_iter(), memory))?
+    let is_one = Tangent::new(left, view).is_one_thing_with(&right);
+    is_one.then(|| rays.nearest_of(x, y, [left, right].into_iter(), memory))?
 }
 
 /// Takes over into column `x` of `row`, where a ray has met `sample`, what the pixels between which it lies know of light, if

@@ -11,7 +11,7 @@
 //! Of what has come into view nothing is known, and most of it is only filled in [between](super::between) pixels of its row that
 //! were cast. So there a ray is cast wherever one beside it has met another surface, before it or not.
 
-use super::around::{is_one_sheet, is_one_surface};
+use super::around::{Tangent, is_one_surface};
 use super::buzz_buffer::{BuzzBuffer, pixels_around};
 use super::cast::Pass;
 use super::centre::CastCentres;
@@ -89,21 +89,16 @@ fn may_be_hidden<R: CastCentres>(pass: &Pass<'_, R>, buffer: &BuzzBuffer, pixel:
         let mut known = landed.map(|k| pass.old.sample(k)).chain([buffer.sample(pixel)]);
         !known.any(|known| is_one_surface(&known, &sample, pass.view))
     };
-    let stands_before = |met: usize| {
-        !buffer.class[met].is_reused()
-            && buffer.z[met] < buffer.z[pixel]
-            && !buffer.is_same_primitive(met, pixel)
-    };
+    let is_met_elsewhere =
+        |met: usize| !buffer.class[met].is_reused() && !buffer.is_same_primitive(met, pixel);
     if !buffer.class[pixel].is_reused() || !is_beside_met(buffer, pixel) {
         return false;
     }
     if buffer.class[pixel] == PixelClass::Filled && pass.is_new(pixel) {
-        let is_other = |met: usize| !is_one_sheet(&buffer.sample(pixel), &buffer.sample(met), pass.view);
-        return around().any(|met| {
-            !buffer.class[met].is_reused() && !buffer.is_same_primitive(met, pixel) && is_other(met)
-        });
+        let tangent = Tangent::new(buffer.sample(pixel), pass.view);
+        return around().any(|met| is_met_elsewhere(met) && !tangent.is_one_thing_with(&buffer.sample(met)));
     }
-    around().any(|met| stands_before(met) && is_unknown(met))
+    around().any(|met| is_met_elsewhere(met) && buffer.z[met] < buffer.z[pixel] && is_unknown(met))
 }
 
 /// True if a ray was cast at any of the nine pixels around and at `pixel`.

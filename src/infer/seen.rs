@@ -29,7 +29,7 @@ impl<'a> SeenLight<'a> {
         let at = self.view.project(point.position, point.normal.direction(), false)?;
         let cell = Cell::at(buffer, Vec2::new(at.x, at.y) - 0.5)?;
         let (tangent, lit) = (Tangent::new(*point, &self.view), buffer.lit(cell.nearest()));
-        let is_seen = |&pixel: &usize| tangent.may_borrow_from(buffer, pixel);
+        let is_seen = |&pixel: &usize| tangent.is_one_thing_with(&buffer.sample(pixel));
         let agrees = |&pixel: &usize| agree(lit, buffer.lit(pixel));
         (cell.corners.iter().all(is_seen) && cell.corners.iter().all(agrees)).then_some(lit)
     }

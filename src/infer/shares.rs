@@ -42,7 +42,7 @@ pub(super) fn carry(
         }
         let pixel = y as usize * width + x as usize;
         let weight = columns[right] * rows[down];
-        (pixel, if tangent.may_borrow_from(old, pixel) { weight } else { 0.0 })
+        (pixel, if tangent.is_one_thing_with(&old.sample(pixel)) { weight } else { 0.0 })
     });
     let mut known = corners.iter().filter(|&&(_, weight)| weight > 0.0);
     rays.blend(known.clone().map(|&(pixel, weight)| (old.lit(pixel), weight)), lit);

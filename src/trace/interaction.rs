@@ -97,6 +97,7 @@ impl<'a> SurfaceInteraction<'a> {
     }
 
     /// The shading normal that the normal map says; `tangent` has the sign of the bitangent beside it.
+    // As [`Self::coordinates`], which it asks for, and as much is handed on.
     #[inline(always)]
     fn mapped(&self, map: &NormalTexture, tangent: Option<(Vec3, f32)>) -> Vec3 {
         let sampled = self.texture(&map.texture);
