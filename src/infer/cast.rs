@@ -177,8 +177,6 @@ impl<'a, R: CastCentres> Pass<'a, R> {
     }
 
     /// Casts a pixel that is unknown, unless what it shows is `found` already, and finds out what is known around it of its lights.
-    // Few pixels come here; the others are done with sooner if this stays out of their way.
-    #[inline(never)]
     fn see(
         &self,
         (x, y): (usize, usize),
