@@ -13,9 +13,9 @@ const STEP: f32 = 1.0;
 /// Least cosine between normals of samples that may lend each other shadow bits.
 pub(super) const SAME_FACING: f32 = 0.9;
 
-/// So many samples on its surface must agree before a pixel that was cast borrows shadow bits from the 5x5 around it.
-/// Fewer are all on one side of it, as at the foot of a wall, where a shadow begins.
-pub(super) const ENOUGH_TO_LEND: usize = 6;
+/// So many samples on its surface, its own among them, must agree before a pixel that was cast borrows shadow bits from the 5x5
+/// around it. What they are wrong about [is followed](super::shadow_edges) from where it is asked.
+const ENOUGH_TO_LEND: usize = 3;
 
 /// How much is believed without a ray.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -137,9 +137,14 @@ impl<'a> Around<'a> {
     }
 
     /// The cell that has come to the centre along with old sample `mover`, if all of it shows the surface of `i`.
-    fn cell_on(&self, (tangent, i): (&Tangent<'_>, usize), mover: usize) -> Option<Cell> {
-        let is_on = |k: &usize| self.old.is_same_primitive(i, *k) || tangent.reaches(&self.old.sample(*k));
-        Cell::of(self.old, self.view, mover, self.pixel).filter(|cell| cell.corners.iter().all(is_on))
+    fn cell_on(&self, surface: (&Tangent<'_>, usize), mover: usize) -> Option<Cell> {
+        let cell = Cell::of(self.old, self.view, mover, self.pixel)?;
+        cell.corners.iter().all(|&k| self.is_on(surface, k)).then_some(cell)
+    }
+
+    /// True if old sample `k` shows the surface of `i`.
+    fn is_on(&self, (tangent, i): (&Tangent<'_>, usize), k: usize) -> bool {
+        self.old.is_same_primitive(i, k) || tangent.reaches(&self.old.sample(k))
     }
 
     /// True if no outline between the surface of `i` and `others` passes here. An outline moves with what is nearer. That is
@@ -158,12 +163,19 @@ impl<'a> Around<'a> {
         self.is_complete() && self.known().all(|k| self.old.is_lit_alike(first, k))
     }
 
-    /// Sets in `ask` the bits of the lights about which the samples around disagree, and clears all others.
-    pub fn disagreement(&self, rays: &impl CastCentres, trust: Trust, ask: &mut [u32]) {
+    /// Sets in `ask` the bits of the lights about which the samples around disagree, and clears all others. If neighbours are
+    /// trusted, only those on the surface of old sample `i` are heard: what is lit before or behind it says nothing.
+    pub fn disagreement(&self, i: usize, rays: &impl CastCentres, trust: Trust, ask: &mut [u32]) {
         if trust == Trust::Proof && !self.is_complete() {
-            ask.fill(u32::MAX);
-        } else {
-            differing(rays, self.old, &self.known, ask);
+            return ask.fill(u32::MAX);
+        }
+        ask.fill(0);
+        let mut tangent = None;
+        for k in self.known().filter(|&k| !self.old.is_lit_alike(i, k)) {
+            let tangent = tangent.get_or_insert_with(|| Tangent::new(self.old.sample(i), self.view));
+            if trust == Trust::Proof || self.is_on((tangent, i), k) {
+                rays.differ(self.old.lit(i), self.old.lit(k), ask);
+            }
         }
     }
 

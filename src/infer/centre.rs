@@ -235,7 +235,7 @@ impl Centring {
                                 // A hole may hide a shadow's edge: then look farther.
                                 let wide = || Around::new(old, view, sources, (x, y), 2);
                                 let around = if around.is_complete() { around } else { wide() };
-                                around.disagreement(rays, trust, ask);
+                                around.disagreement(i, rays, trust, ask);
                             }
                         }
                         if rays.has_shares() {

@@ -15,7 +15,7 @@
 //! What inference has found out about the pixel goes for its sub-pixels: where something unknown may stand before it, or a
 //! gap opened in an object, they are traced. So only positions on which something landed are cleaned up.
 
-use super::around::{ENOUGH_TO_LEND, SAME_FACING, Trust, is_one_surface};
+use super::around::{SAME_FACING, Trust, is_one_surface};
 use super::buzz_buffer::{BuzzBuffer, Projector, UNKNOWN};
 use super::centre::{CastCentres, ENOUGH_TO_FILL};
 use super::lattice::Position;
@@ -28,6 +28,9 @@ use crate::scene::View;
 use glam::DVec3;
 use rayon::prelude::*;
 use std::sync::atomic::AtomicU64;
+
+/// So many samples on its surface must agree before a sub-pixel borrows shadow bits from the 5x5 around it.
+const ENOUGH_TO_LEND: usize = 6;
 
 /// What super-sampling holds between frames, so that nothing is allocated for each.
 #[derive(Debug, Default)]

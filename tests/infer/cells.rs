@@ -68,3 +68,19 @@ fn a_pixel_that_is_cast_takes_the_light_of_the_cell_that_it_was_in() {
         assert!(!asked.contains(&(5, y)));
     }
 }
+
+#[test]
+fn light_on_what_is_before_or_behind_it_makes_no_pixel_ask() {
+    // The card is lit and the wall is not, each as far as it is seen: where the light ends is hidden.
+    let stage = Stage { card_ends: 0.0, light_ends: 0.0, strip: f64::NAN };
+    for (x, beside) in [(-0.3, 4), (0.3, 5)] {
+        let (new, eye) = infer(&stage, x);
+        let asked = eye.asked.lock().unwrap();
+        for y in 2..8usize {
+            assert_eq!(new.class[y * SIDE as usize + beside], PixelClass::Good);
+            assert!(!asked.contains(&(beside, y)), "from {x}, row {y}");
+            let lit = |x: usize| new.lit(y * SIDE as usize + x)[0];
+            assert_eq!([lit(3), lit(6)], [1, 0]);
+        }
+    }
+}
