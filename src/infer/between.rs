@@ -5,6 +5,9 @@
 //! asks, then the one in the middle between two of these, then those between: they are cast only where these two do not show one
 //! surface, and ask only about what they do not agree on.
 //!
+//! At an outline what comes into view is a pixel or two wide, and beside it in its row is something else. So rows come in pairs:
+//! in the second, a pixel that is cast takes the light of the one above it, if that was cast and shows the same surface.
+//!
 //! A pixel is filled so only if nothing landed around it either: elsewhere an outline is near. What is too narrow for one row is
 //! met in another, whose steps begin elsewhere, and from there [followed](super::outlines).
 
@@ -72,11 +75,11 @@ pub(super) fn fill<R: CastCentres>(
     is_one.then(|| rays.nearest_of(x, y, [left, right].into_iter(), memory))?
 }
 
-/// Takes over into column `x` of `row`, where a ray has met `sample`, what the pixels between which it lies know of light, if
-/// both lie on its surface; for shares one will do. In `ask` only the bits of lights on which they disagree are left, and of
-/// shares to be confirmed.
+/// Takes over into column `x` of `row`, where a ray has met `sample`, what is known of light in the pixel `above` it, if that was
+/// cast and lies on its surface; else what the pixels between which it lies know, if both lie on its surface; for shares one will
+/// do. In `ask` only the bits of lights on which they disagree are left, and of shares to be confirmed.
 pub(super) fn lend(
-    row: &mut Row<'_>,
+    (row, above): (&mut Row<'_>, Option<&Row<'_>>),
     x: usize,
     steps: Steps,
     view: &Projector,
@@ -84,8 +87,19 @@ pub(super) fn lend(
     rays: &impl CastCentres,
     ask: &mut [u32],
 ) {
-    let Some(reach) = steps.reach(x) else { return };
     let tangent = Tangent::new(*sample, view);
+    if let Some(above) = above
+        && !above.class[x].is_reused()
+        && tangent.may_lend(&above.sample(x))
+    {
+        row.put_lit(x, above.lit(x));
+        ask.fill(0);
+        if rays.has_shares() {
+            rays.confirm(ask);
+        }
+        return;
+    }
+    let Some(reach) = steps.reach(x) else { return };
     let lends = |other: usize| other < row.object.len() && tangent.may_lend(&row.sample(other));
     let known = (x.checked_sub(reach).is_some_and(lends), lends(x + reach));
     let words = row.lit_words;

@@ -165,10 +165,15 @@ impl BuzzBuffer {
 
     /// The rows, for writing in parallel.
     pub(super) fn rows_mut(&mut self) -> impl IndexedParallelIterator<Item = Row<'_>> {
-        let (w, lit_words) = (self.width, self.lit_words);
+        self.bands_mut(1)
+    }
+
+    /// So many rows at a time, one after the other, for writing in parallel; the last may have fewer.
+    pub(super) fn bands_mut(&mut self, rows: usize) -> impl IndexedParallelIterator<Item = Row<'_>> {
+        let (w, lit_words) = (rows * self.width, self.lit_words);
         // A scene without lights has no shadow words, but a chunk's length may not be zero.
-        self.lit.resize((w * self.height * lit_words).max(self.height), 0);
-        let lit_row = (w * lit_words).max(1);
+        self.lit.resize((self.width * self.height * lit_words).max(self.height), 0);
+        let lit_row = (w * lit_words).max(rows);
         (
             self.z.par_chunks_mut(w),
             self.position.par_chunks_mut(w),
@@ -202,7 +207,7 @@ pub(super) fn pixels_around(width: usize, height: usize, pixel: usize) -> impl I
     })
 }
 
-/// One row of a [`BuzzBuffer`].
+/// One row of a [`BuzzBuffer`], or several.
 pub(super) struct Row<'a> {
     pub z: &'a mut [f32],
     pub position: &'a mut [Vec3],
@@ -214,7 +219,34 @@ pub(super) struct Row<'a> {
     pub lit_words: usize,
 }
 
-impl Row<'_> {
+impl<'a> Row<'a> {
+    /// What is before column `x`, and what is from there on.
+    pub fn split_at(self, x: usize) -> [Self; 2] {
+        let Self { lit_words, .. } = self;
+        let x = x.min(self.object.len());
+        let z = self.z.split_at_mut(x);
+        let position = self.position.split_at_mut(x);
+        let object = self.object.split_at_mut(x);
+        let surface = self.surface.split_at_mut(x);
+        let normal = self.normal.split_at_mut(x);
+        let lit = self.lit.split_at_mut(x * lit_words);
+        let class = self.class.split_at_mut(x);
+        let row = |z, position, object, surface, normal, lit, class| Row {
+            z,
+            position,
+            object,
+            surface,
+            normal,
+            lit,
+            class,
+            lit_words,
+        };
+        [
+            row(z.0, position.0, object.0, surface.0, normal.0, lit.0, class.0),
+            row(z.1, position.1, object.1, surface.1, normal.1, lit.1, class.1),
+        ]
+    }
+
     /// The sample in column `x`.
     pub fn sample(&self, x: usize) -> SurfaceSample {
         SurfaceSample {
@@ -226,6 +258,11 @@ impl Row<'_> {
     }
 
     /// The shadow bits of column `x`.
+    pub fn lit(&self, x: usize) -> &[u32] {
+        &self.lit[x * self.lit_words..][..self.lit_words]
+    }
+
+    /// The shadow bits of column `x`, for writing.
     pub fn lit_mut(&mut self, x: usize) -> &mut [u32] {
         &mut self.lit[x * self.lit_words..][..self.lit_words]
     }

@@ -75,7 +75,7 @@ impl<'a, R: CastCentres> Pass<'a, R> {
 
     /// Casts what is wanted at all pixels.
     pub fn cast(&self, new: &mut BuzzBuffer, bits: Bits<'_>) -> RayCounts {
-        self.by_rows(new, bits, |y, row, bits, counts| {
+        self.by_rows(new, bits, |y, (row, above), bits, counts| {
             let (steps, mut memory) = (Steps::of(y), R::Memory::default());
             steps.columns(row.object.len(), |x| {
                 if row.object[x] != UNKNOWN && self.wants_proof((x, y), row) {
@@ -83,7 +83,7 @@ impl<'a, R: CastCentres> Pass<'a, R> {
                 }
                 if row.object[x] == UNKNOWN {
                     let found = self.fill((x, y), row, steps, &mut memory);
-                    self.see((x, y), row, found, self.of_pixel(bits, x), counts);
+                    self.see((x, y), (row, above), found, self.of_pixel(bits, x), counts);
                 }
                 self.ask((x, y), row, self.of_pixel(bits, x), counts);
             });
@@ -94,7 +94,7 @@ impl<'a, R: CastCentres> Pass<'a, R> {
     /// others.
     pub fn prove(&self, new: &mut BuzzBuffer, pixels: &[u32], bits: Bits<'_>) -> RayCounts {
         let width = self.old.width();
-        self.by_rows(new, bits, |y, row, bits, counts| {
+        self.by_rows(new, bits, |y, (row, above), bits, counts| {
             let first = pixels.partition_point(|&pixel| (pixel as usize) < y * width);
             let columns = pixels[first..].iter().map(|&pixel| pixel as usize - y * width);
             for x in columns.take_while(|&x| x < width) {
@@ -105,31 +105,40 @@ impl<'a, R: CastCentres> Pass<'a, R> {
                     self.forget_if_hidden(x, row, counts);
                 }
                 if row.object[x] == UNKNOWN {
-                    self.see((x, y), row, None, self.of_pixel(bits, x), counts);
+                    self.see((x, y), (row, above), None, self.of_pixel(bits, x), counts);
                     self.ask((x, y), row, self.of_pixel(bits, x), counts);
                 }
             }
         })
     }
 
-    /// Calls `cast_row` for each row, in parallel.
+    /// Calls `cast_row` for each row, two by two and in parallel; of the second of two, with what the first has become.
     fn by_rows(
         &self,
         new: &mut BuzzBuffer,
         (ask, doubt): Bits<'_>,
-        cast_row: impl Fn(usize, &mut Row<'_>, &mut Bits<'_>, &mut RayCounts) + Sync,
+        cast_row: impl Fn(usize, (&mut Row<'_>, Option<&Row<'_>>), &mut Bits<'_>, &mut RayCounts) + Sync,
     ) -> RayCounts {
+        let (width, words) = (self.old.width(), self.old.width() * self.old.lit_words());
         // Without lights there are no words, but a chunk's length may not be zero.
-        let words = (self.old.width() * self.old.lit_words()).max(1);
-        let rows = new.rows_mut().zip(ask.par_chunks_mut(words)).zip(doubt.par_chunks_mut(words));
-        let cast_row = |(y, ((mut row, ask), doubt)): (usize, ((Row<'_>, _), _))| {
+        let bits = |bits| <[u32]>::par_chunks_mut(bits, (2 * words).max(2));
+        let pairs = new.bands_mut(2).zip(bits(ask)).zip(bits(doubt));
+        let cast_pair = |(number, ((rows, ask), doubt)): (usize, ((Row<'_>, _), _))| {
             let mut counts = RayCounts::default();
-            if !self.rays.is_cancelled() {
-                cast_row(y, &mut row, &mut (ask, doubt), &mut counts);
+            if self.rays.is_cancelled() {
+                return counts;
+            }
+            let [mut first, mut second] = rows.split_at(width);
+            let [ask, doubt] = [ask, doubt].map(|bits| <[u32]>::split_at_mut(bits, words));
+            cast_row(2 * number, (&mut first, None), &mut (ask.0, doubt.0), &mut counts);
+            // An odd number of rows leaves one alone.
+            if !second.object.is_empty() {
+                let above = Some(&first);
+                cast_row(2 * number + 1, (&mut second, above), &mut (ask.1, doubt.1), &mut counts);
             }
             counts
         };
-        rows.enumerate().map(cast_row).sum()
+        pairs.enumerate().map(cast_pair).sum()
     }
 
     /// The bits of column `x` of a row's.
@@ -180,7 +189,7 @@ impl<'a, R: CastCentres> Pass<'a, R> {
     fn see(
         &self,
         (x, y): (usize, usize),
-        row: &mut Row<'_>,
+        (row, above): (&mut Row<'_>, Option<&Row<'_>>),
         found: Option<SurfaceSample>,
         (ask, doubt): Bits<'_>,
         counts: &mut RayCounts,
@@ -205,7 +214,7 @@ impl<'a, R: CastCentres> Pass<'a, R> {
         // What only lies around a pixel on which nothing landed is asked anew, but for shares, which a few rays confirm.
         let is_poor = if rays.has_shares() { lent == Lent::Nothing } else { lent != Lent::Cell };
         if certain.is_none() && is_poor && self.trust == Trust::Neighbours {
-            between::lend(row, x, Steps::of(y), view, &sample, rays, ask);
+            between::lend((row, above), x, Steps::of(y), view, &sample, rays, ask);
         } else if lent != Lent::Nothing {
             spare((x, y), self.trust, rays, ask);
         }

@@ -1,6 +1,6 @@
 //! Where nothing landed, some pixels are cast and ask for the light, and those between only where these do not agree.
 
-use crate::stage::{SIDE, Stage, infer};
+use crate::stage::{SIDE, Stage, WALL, infer};
 use buzz::frame::PixelClass;
 
 /// Columns of which nothing was known, nor of what is around them, seen from 6 pixels to the right.
@@ -30,10 +30,13 @@ fn cast_and_asked(stage: &Stage) -> Vec<[Vec<usize>; 2]> {
 fn a_few_pixels_are_cast_and_ask_where_all_is_one_surface_lit_alike() {
     for light_ends in [f64::INFINITY, f64::NEG_INFINITY] {
         let rows = cast_and_asked(&Stage { card_ends: f64::INFINITY, light_ends, strip: f64::NAN });
-        for [cast, asked] in &rows {
+        for (y, [cast, asked]) in rows.iter().enumerate() {
             // At most the end of a step, and those that are alone because what is beside them is outside the image.
             assert!((1..=3).contains(&cast.len()), "{rows:?}");
-            assert_eq!(cast, asked, "{rows:?}");
+            // The second of two rows takes what the first has asked.
+            let is_above = |x: &usize| y % 2 == 1 && rows[y - 1][0].contains(x);
+            let alone: Vec<_> = cast.iter().copied().filter(|x| !is_above(x)).collect();
+            assert_eq!(&alone, asked, "{rows:?}");
         }
         assert!(rows.iter().any(|row| row != &rows[0]), "rows begin at different columns");
     }
@@ -46,6 +49,21 @@ fn an_edge_is_found_between_pixels_that_disagree() {
         for [cast, asked] in cast_and_asked(&Stage { card_ends, light_ends, strip: f64::NAN }) {
             let beside = if card_ends.is_finite() { &cast } else { &asked };
             assert!(beside.contains(&6) && beside.contains(&7), "{cast:?}, {asked:?}");
+        }
+    }
+}
+
+#[test]
+fn a_column_that_opens_asks_in_every_other_row_and_the_rows_between_take_its_light() {
+    for light_ends in [f64::INFINITY, f64::NEG_INFINITY] {
+        // The card goes away from the fifth column, where the wall is seen now.
+        let stage = Stage { card_ends: 0.0, light_ends, strip: f64::NAN };
+        let (new, eye) = infer(&stage, 0.8);
+        let asked = eye.asked.lock().unwrap();
+        for y in 0..SIDE as usize {
+            let i = y * SIDE as usize + 4;
+            assert_eq!((new.object[i], new.lit(i)[0] == 1), (WALL.0, light_ends > 0.0), "row {y}");
+            assert_eq!(asked.contains(&(4, y)), y % 2 == 0, "row {y}");
         }
     }
 }
