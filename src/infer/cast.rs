@@ -22,7 +22,11 @@ const LOOKOUT: usize = 32;
 /// nothing landed, and in the background.
 const NEAR_LOOKOUT: usize = 16;
 
-/// The growth in a frame from which that is so.
+/// One pixel in so many at the sides of the image. What comes in there before what hardly moves, or goes out, as the sky does and
+/// what a camera turns around, lands nowhere and leaves no pixel empty.
+const SIDE_LOOKOUT: usize = 8;
+
+/// The growth in a frame from which what is seen grows fast.
 const FAST: f32 = 1.03;
 
 /// One pixel in so many, on either axis, has its shares confirmed.
@@ -43,6 +47,11 @@ impl Grid {
     /// True at one pixel in `step` on either axis; a grid of half the step has all pixels of the whole one.
     fn has(self, (x, y): (usize, usize), step: usize) -> bool {
         x % step == self.first.0 % step && y % step == self.first.1 % step
+    }
+
+    /// True at one pixel in [`SIDE_LOOKOUT`] of each row and each column.
+    fn has_side(self, (x, y): (usize, usize)) -> bool {
+        (x + y) % SIDE_LOOKOUT == (self.first.0 + self.first.1) % SIDE_LOOKOUT
     }
 }
 
@@ -153,7 +162,10 @@ impl<'a, R: CastCentres> Pass<'a, R> {
         let comes_near = |i: usize| self.old.z[i] > FAST * row.z[x] || self.old.z[i].is_infinite();
         let grows = || self.sources.of(y * self.old.width() + x).is_none_or(comes_near);
         let has = |step: usize| self.grid.has((x, y), step);
-        self.trust == Trust::Proof || self.moves && has(NEAR_LOOKOUT) && (has(LOOKOUT) || grows())
+        let is_at_side = || x == 0 || y == 0 || x + 1 == self.old.width() || y + 1 == self.old.height();
+        let looks_out =
+            || has(NEAR_LOOKOUT) && (has(LOOKOUT) || grows()) || is_at_side() && self.grid.has_side((x, y));
+        self.trust == Trust::Proof || self.moves && looks_out()
     }
 
     /// True if nothing landed on a pixel, nor on any around it.

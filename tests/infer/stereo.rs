@@ -2,7 +2,7 @@
 
 use crate::rig::{Eye, Spheres, camera, four_spheres, is_hidden, off_centre, reused, spheres};
 use buzz::frame::{RayCounts, StereoEye};
-use buzz::infer::{BuzzBuffer, CastRays, Inference, Move, Projector, Trust};
+use buzz::infer::{BuzzBuffer, CastCentres, CastRays, Inference, Move, Projector, Trust};
 use buzz::scene::{Stereo, View};
 use glam::DVec3;
 use proptest::prelude::*;
@@ -59,6 +59,21 @@ proptest! {
     fn a_verified_eye_sees_nothing_through_others(scene in spheres(), stereo in stereo()) {
         let (view, right, _) = pair(&scene, stereo, Some(Trust::Proof));
         prop_assert!((0..right.class.len()).all(|i| !is_hidden(&scene, &view, &right.sample(i))));
+    }
+}
+
+/// A ball comes in at the right, before a sky that says nothing about it: no pixel is missed there.
+#[test]
+fn what_comes_in_before_the_sky_is_met_at_the_side() {
+    let scene = Spheres(vec![(DVec3::new(3.55, 1.2, -3.9), 1.2)]);
+    for step in 8..24 {
+        let stereo = Stereo { interocular: 0.02 * f64::from(step), convergence: f64::INFINITY };
+        let (view, right, _) = pair(&scene, stereo, Some(Trust::Neighbours));
+        let truth = Eye::of(&scene, &view);
+        let object = |i: usize| truth.hit(i % 48, i / 48, &mut RayCounts::default()).object;
+        // One pixel in eight of the side is proven.
+        assert!((0..32).filter(|y| object(y * 48 + 47) == 2).count() >= 8, "it comes in");
+        assert!((0..right.class.len()).all(|i| object(i) == right.object[i]), "at {stereo:?}");
     }
 }
 
