@@ -24,7 +24,7 @@ const NEAR_LOOKOUT: usize = 16;
 
 /// One pixel in so many at the sides of the image. What comes in there before what hardly moves, or goes out, as the sky does and
 /// what a camera turns around, lands nowhere and leaves no pixel empty.
-const SIDE_LOOKOUT: usize = 8;
+const SIDE_LOOKOUT: usize = 4;
 
 /// The growth in a frame from which what is seen grows fast.
 const FAST: f32 = 1.03;

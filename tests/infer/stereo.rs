@@ -66,13 +66,13 @@ proptest! {
 #[test]
 fn what_comes_in_before_the_sky_is_met_at_the_side() {
     let scene = Spheres(vec![(DVec3::new(3.55, 1.2, -3.9), 1.2)]);
-    for step in 8..24 {
+    for step in 3..24 {
         let stereo = Stereo { interocular: 0.02 * f64::from(step), convergence: f64::INFINITY };
         let (view, right, _) = pair(&scene, stereo, Some(Trust::Neighbours));
         let truth = Eye::of(&scene, &view);
         let object = |i: usize| truth.hit(i % 48, i / 48, &mut RayCounts::default()).object;
-        // One pixel in eight of the side is proven.
-        assert!((0..32).filter(|y| object(y * 48 + 47) == 2).count() >= 8, "it comes in");
+        // One pixel in four of the side is proven.
+        assert!((0..32).filter(|y| object(y * 48 + 47) == 2).count() >= 4, "it comes in");
         assert!((0..right.class.len()).all(|i| object(i) == right.object[i]), "at {stereo:?}");
     }
 }
