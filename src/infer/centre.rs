@@ -13,8 +13,8 @@
 //! - Everywhere else a ray is cast, so that an edge moves even if it moves by less than half a pixel a frame. What rays meet
 //!   that nothing around knew of is [followed](super::outlines).
 //!
-//! Shadow bits are settled light by light. The points around say whether a light reaches the surface here: where they
-//! agree they are believed; where they do not, the shadow's edge is near and a ray is cast to that light alone, but for
+//! Shadow bits are settled light by light. The points around on the same surface say whether a light reaches it here: where
+//! they agree they are believed; where they do not, the shadow's edge is near and a ray is cast to that light alone, but for
 //! every other pixel whose cell agrees. The bits around a wrong bit disagree with it, so an error does not live on. Shares
 //! of lights that have a size are carried along with the surface ([`carry`]); where they change fast from point to point,
 //! a few rays renew them.
