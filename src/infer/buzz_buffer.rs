@@ -184,16 +184,7 @@ impl BuzzBuffer {
             self.class.par_chunks_mut(w),
         )
             .into_par_iter()
-            .map(move |(z, position, object, surface, normal, lit, class)| Row {
-                z,
-                position,
-                object,
-                surface,
-                normal,
-                lit,
-                class,
-                lit_words,
-            })
+            .map(move |columns| Row::of(columns, lit_words))
     }
 }
 
@@ -219,32 +210,32 @@ pub(super) struct Row<'a> {
     pub lit_words: usize,
 }
 
+/// What a [`Row`] has of each column, in the order of its fields.
+type Columns<'a> = (
+    &'a mut [f32],
+    &'a mut [Vec3],
+    &'a mut [u32],
+    &'a mut [SurfaceRef],
+    &'a mut [PackedNormal],
+    &'a mut [u32],
+    &'a mut [PixelClass],
+);
+
 impl<'a> Row<'a> {
+    fn of((z, position, object, surface, normal, lit, class): Columns<'a>, lit_words: usize) -> Self {
+        Self { z, position, object, surface, normal, lit, class, lit_words }
+    }
+
     /// What is before column `x`, and what is from there on.
     pub fn split_at(self, x: usize) -> [Self; 2] {
-        let Self { lit_words, .. } = self;
         let x = x.min(self.object.len());
-        let z = self.z.split_at_mut(x);
-        let position = self.position.split_at_mut(x);
-        let object = self.object.split_at_mut(x);
-        let surface = self.surface.split_at_mut(x);
-        let normal = self.normal.split_at_mut(x);
-        let lit = self.lit.split_at_mut(x * lit_words);
-        let class = self.class.split_at_mut(x);
-        let row = |z, position, object, surface, normal, lit, class| Row {
-            z,
-            position,
-            object,
-            surface,
-            normal,
-            lit,
-            class,
-            lit_words,
-        };
-        [
-            row(z.0, position.0, object.0, surface.0, normal.0, lit.0, class.0),
-            row(z.1, position.1, object.1, surface.1, normal.1, lit.1, class.1),
-        ]
+        let (z, position) = (self.z.split_at_mut(x), self.position.split_at_mut(x));
+        let (object, surface) = (self.object.split_at_mut(x), self.surface.split_at_mut(x));
+        let (normal, class) = (self.normal.split_at_mut(x), self.class.split_at_mut(x));
+        let lit = self.lit.split_at_mut(x * self.lit_words);
+        let before = (z.0, position.0, object.0, surface.0, normal.0, lit.0, class.0);
+        let after = (z.1, position.1, object.1, surface.1, normal.1, lit.1, class.1);
+        [before, after].map(|columns| Self::of(columns, self.lit_words))
     }
 
     /// The sample in column `x`.
