@@ -13,7 +13,7 @@ pub const PIXELS_PER_DEGREE: f32 = 67.0;
 
 /// Exponent of colour differences.
 const COLOR_EXPONENT: f32 = 0.7;
-/// Where the mapping of colour differences to [0,1] bends: this share of the largest maps to the value after it.
+/// Where the mapping of colour differences to `[0, 1]` bends: this share of the largest maps to the value after it.
 const BEND: (f32, f32) = (0.4, 0.95);
 /// Width of an edge, degrees.
 const EDGE_DEGREES: f32 = 0.082;
@@ -177,7 +177,7 @@ fn balanced(mut taps: Vec<f32>) -> Vec<f32> {
     taps
 }
 
-/// Colour difference to [0,1]: nearly all of the range for the differences that occur.
+/// Colour difference to `[0, 1]`: nearly all of the range for the differences that occur.
 fn mapped_color_difference(difference: f32, largest: f32) -> f32 {
     let bend = BEND.0 * largest;
     if difference < bend {

@@ -1,6 +1,6 @@
 //! What each quality costs and what it gets wrong: all of them on the same frames, in one run.
 //!
-//! Whole segments are sampled ([`sample`]), so that samples are carried on as far as they are in a whole run. Each segment is
+//! Whole segments are sampled ([`sample()`]), so that samples are carried on as far as they are in a whole run. Each segment is
 //! rendered by every quality in turn before the next segment is begun ([`trade`]), so that whatever else the machine does
 //! meets all of them alike. The first to be given is the truth.
 

@@ -31,7 +31,7 @@ pub trait Watch: Sync {
 
 /// Measures `candidates` on the frames of `spans`, against the first of them.
 ///
-/// Pictures are compared at half precision, as files hold them, so that the errors are those of [`super::super::compare`] on
+/// Pictures are compared at half precision, as files hold them, so that the errors are those of [`super::super::compare()`] on
 /// the files of separate runs. All sampled frames of the truth are kept in memory, 8 bytes a pixel.
 ///
 /// # Errors
