@@ -16,6 +16,9 @@ from pathlib import Path
 # buzz-convert --progress plain: "frame 12: inferred from 8, 3.1 % of pixels traced; 5/24, 87 % of rays saved, ..."
 _FRAME = re.compile(r"; (\d+)/(\d+),")
 
+# What stands before the warnings and the error of buzz-convert.
+_PROGRAM = "buzz-convert: "
+
 
 @dataclass
 class Task:
@@ -105,12 +108,12 @@ class Task:
         if match:
             self.factor = int(match[1]) / max(int(match[2]), 1)
             self.text = line
-        elif line.startswith("export:"):
+        elif line.startswith(("export:", "frame ")):
             self.text = line
-        elif line.startswith("warning:"):
-            self.warnings.append(line.removeprefix("warning:").strip())
-        elif line.startswith("error:"):
-            self.error = line.removeprefix("error:").strip()
+        elif line.startswith((_PROGRAM + "warning:", "warning:")):
+            self.warnings.append(line.removeprefix(_PROGRAM).removeprefix("warning:").strip())
+        elif line.startswith((_PROGRAM, "error:")):
+            self.error = line.removeprefix(_PROGRAM).removeprefix("error:").strip()
 
 
 def export_command(blender: str, blend: Path, output: Path, options: Sequence[str]) -> list[str]:

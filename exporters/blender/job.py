@@ -135,11 +135,14 @@ class _Export:
             document = Document()
         bpy.context.window.scene = self.scene
         self._collect(document, sampler)
+        return document
+
+    def _place_textures(self) -> None:
+        """Put the textures beside the file that is about to be written; those of an earlier export stay until then."""
         textures = self.work / f"{self.path.stem}_textures"
         if textures.is_dir() and any(textures.iterdir()):
             shutil.rmtree(self.path.parent / textures.name, ignore_errors=True)
             shutil.move(textures, self.path.parent / textures.name)
-        return document
 
     def _collect(self, document: Document, sampler: Sampler) -> None:
         """Read back which mesh each shape became, and drop the nodes."""
@@ -230,6 +233,7 @@ class _Export:
         if not document.root["scenes"][0]["nodes"]:
             document.root["scenes"][0].pop("nodes")
         extras.check(document.root)
+        self._place_textures()
         document.save(self.path)
 
 

@@ -10,6 +10,7 @@ from __future__ import annotations
 import base64
 import json
 import os
+import secrets
 import struct
 from pathlib import Path
 from typing import Any
@@ -159,11 +160,15 @@ def _number(x: Any) -> int | float:
 
 
 def write_whole(path: Path, data: bytes) -> None:
-    """Write beside and rename, so that no reader ever sees half a file."""
-    temporary = path.with_name(path.name + ".tmp")
+    """Write beside, to disk, and rename: no reader ever sees half a file, and what fails leaves none."""
+    temporary = path.with_name(f".{path.name}.{secrets.token_hex(4)}.tmp")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        temporary.write_bytes(data)
+        with temporary.open("xb") as file:
+            file.write(data)
+            file.flush()
+            os.fsync(file.fileno())
         os.replace(temporary, path)
     except OSError as error:
+        temporary.unlink(missing_ok=True)
         raise OutputError(f"{path}: cannot be written ({error.strerror}); choose another output folder") from error

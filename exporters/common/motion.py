@@ -147,6 +147,7 @@ class Animation:
         self.document = document
         self.times = np.asarray(times, dtype=np.float32)
         self.data: dict = {"name": name, "samplers": [], "channels": []}
+        self._samplers: dict[tuple[int, int, str], int] = {}
 
     def close(self) -> None:
         """Put the animation into the document, if it has a channel."""
@@ -155,15 +156,13 @@ class Animation:
 
     def _channel(self, values: np.ndarray, target: dict, step: bool = False) -> None:
         keep = _kinks(values, step)
-        sampler = {
-            "input": self.document.add_accessor(self.times[keep], limits=True),
-            "output": self.document.add_accessor(values[keep]),
-            "interpolation": "STEP" if step else "LINEAR",
-        }
+        times, output = self.document.add_accessor(self.times[keep], limits=True), self.document.add_accessor(values[keep])
+        interpolation = "STEP" if step else "LINEAR"
         samplers = self.data["samplers"]
-        if sampler not in samplers:
-            samplers.append(sampler)
-        self.data["channels"].append({"sampler": samplers.index(sampler), "target": target})
+        index = self._samplers.setdefault((times, output, interpolation), len(samplers))
+        if index == len(samplers):
+            samplers.append({"input": times, "output": output, "interpolation": interpolation})
+        self.data["channels"].append({"sampler": index, "target": target})
 
     def node(self, node: dict, index: int, matrices: np.ndarray) -> None:
         """Give a node its transform at the first sample, and channels for what moves. `matrices` is (samples, 4, 4)."""

@@ -138,6 +138,26 @@ def test_progress_is_parsed_and_errors_are_kept():
     assert task.error == "no such file"
 
 
+def test_what_buzz_convert_says_is_kept():
+    from exporters.blender.background import Task
+
+    code = "import sys; print('buzz-convert: warning: /materials/3: sheen: left out'); print('buzz-convert: a.gltf: cannot be read'); sys.exit(3)"
+    task = Task([("rendering", [sys.executable, "-c", code])])
+    task.wait()
+    assert (task.error, task.warnings) == ("a.gltf: cannot be read", ["/materials/3: sheen: left out"])
+
+
+def test_an_export_that_fails_leaves_nothing(tmp_path):
+    from exporters.common.document import write_whole
+    from exporters.common.report import OutputError
+
+    write_whole(tmp_path / "a.bin", b"one")
+    (tmp_path / "folder.bin" / "kept").mkdir(parents=True)
+    with pytest.raises(OutputError):
+        write_whole(tmp_path / "folder.bin", b"two")
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["a.bin", "folder.bin"]
+
+
 def test_cancel_ends_the_process():
     from exporters.blender.background import Task
 

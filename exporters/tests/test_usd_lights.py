@@ -123,6 +123,24 @@ def test_dome(usd_convert, tmp_path, turn):
         assert 0.5 + math.atan2(z, x) / (2 * math.pi) == pytest.approx(u_want, abs=1e-5)
 
 
+def test_a_dome_that_changes_is_taken_where_it_is_first_seen(usd_convert):
+    made = u.stage()
+    u.camera(made)
+    made.SetStartTimeCode(1)
+    made.SetEndTimeCode(4)
+    dome = made.DefinePrim("/World/Dome", "DomeLight")
+    dome.GetAttribute("inputs:intensity").Set(1.0)
+    visibility = UsdGeom.Imageable(dome).CreateVisibilityAttr()
+    visibility.Set("invisible", 1)
+    visibility.Set("inherited", 2)
+    for time, colour in ((1, (1, 0, 0)), (2, (0, 1, 0)), (3, (0, 0, 1))):
+        dome.GetAttribute("inputs:color").Set(colour, time)
+    gltf = usd_convert(made)
+    assert gltf.buzz["world"]["color"] == [0, 1, 0]
+    assert gltf.lost_features("/World/Dome") == ["dome light that changes"]
+    assert not gltf.lost_features("stage.usda")
+
+
 def test_plain_dome_and_second_dome(usd_convert):
     made = u.stage()
     u.camera(made)

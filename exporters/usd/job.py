@@ -19,7 +19,7 @@ from ..common import extras, motion
 from ..common.document import Document, write_whole
 from ..common.report import InputError, Lost, OutputError
 from .cameras import CameraTrack
-from .lights import LightTrack, write_dome
+from .lights import DomeTrack, LightTrack, write_dome
 from .materials import Materials
 from .shapes import Geometries
 from .textures import Textures
@@ -71,9 +71,13 @@ def convert(source: Path, target: Path, options: Options) -> Result:
     try:
         return _Conversion(source, target, options).run()
     except Tf.ErrorException as error:
-        # What USD itself refuses, such as an xformOp that does not exist; its text ends with the reason in quotes.
-        reason = " ".join(str(error).split()).rsplit(" : ", 1)[-1].strip("'")
-        raise InputError(f"{source}: {reason}; check the stage with usdchecker") from None
+        # What USD itself refuses, such as an xformOp that does not exist.
+        raise InputError(f"{source}: {_reason(error)}; check the stage with usdchecker") from None
+
+
+def _reason(error: object) -> str:
+    """What an error of USD's says is wrong: its text ends with that, in quotes."""
+    return " ".join(str(error).split()).rsplit(" : ", 1)[-1].strip("' ")
 
 
 def open_stage(source: Path, variants: list[tuple[str, str, str]], lost: Lost) -> Usd.Stage:
@@ -85,7 +89,8 @@ def open_stage(source: Path, variants: list[tuple[str, str, str]], lost: Lost) -
     try:
         stage = Usd.Stage.Open(str(source))
     except Tf.ErrorException as error:
-        raise InputError(f"{source}: not a USD stage ({str(error).strip().splitlines()[-1].strip()})") from None
+        # The first is the parser's own, which names the line.
+        raise InputError(f"{source}: not a USD stage ({_reason(error.args[0])})") from None
     finally:
         delegate.TakeUncoalescedDiagnostics()
         del delegate
@@ -138,7 +143,7 @@ class _Conversion:
         self.tracks: dict[tuple, Track] = {}
         self.cameras: dict[tuple, CameraTrack] = {}
         self.lights: dict[tuple, LightTrack] = {}
-        self.domes: dict[tuple, Found] = {}
+        self.domes: dict[tuple, DomeTrack] = {}
         self.geometry = Geometries(options.levels, self.lost)
         self.taken: list[float] = []
 
@@ -218,13 +223,16 @@ class _Conversion:
         for camera in self.cameras.values():
             camera.write(document, animation, self.lost)
         world = None
-        for found in self.domes.values():
-            if not found.visible:
+        for dome in self.domes.values():
+            path = str(dome.prim.GetPath())
+            if dome.seen is None:
                 continue
             if world is not None:
-                self.lost.add(str(found.prim.GetPath()), "second dome light", "only the first is used; add their images up")
+                self.lost.add(path, "second dome light", "only the first is used; add their images up")
                 continue
-            world = write_dome(found.prim, now, self.root @ found.matrix, self.up, self.target, self.lost)
+            if len(dome.states) > 1:
+                self.lost.add(path, "dome light that changes", "it stays as it is where it is first seen; animate other lights instead")
+            world = write_dome(dome.prim, *dome.seen, self.up, self.target, self.lost)
         cuts = self._cuts()
         if world is None and not self.lights and self.options.camera_light:
             self._camera_light(document, animation, cuts)
@@ -261,7 +269,7 @@ class _Conversion:
                 track = self.cameras.setdefault(found.key, CameraTrack(found.prim))
                 track.sample(time, world, self.units, aspect, self.policy)
             elif found.kind == "dome":
-                self.domes.setdefault(found.key, found)
+                self.domes.setdefault(found.key, DomeTrack(found.prim)).sample(time, world, found.visible)
             elif found.kind == "light":
                 light = self.lights.setdefault(found.key, LightTrack(found.prim))
                 for _ in range(len(light.poses), sample):

@@ -193,6 +193,22 @@ def _warn(prim: Usd.Prim, lost: Lost) -> None:
         lost.add(path, "light filters", "they are left out")
 
 
+@dataclass
+class DomeTrack:
+    """A dome light over the shot: as it is where it is first seen, and whether it is ever otherwise."""
+
+    prim: Usd.Prim
+    seen: tuple[Usd.TimeCode, np.ndarray] | None = None
+    states: set[bytes] = field(default_factory=set)
+
+    def sample(self, time: Usd.TimeCode, world: np.ndarray, visible: bool) -> None:
+        """Take it in at a time, with its matrix in glTF's space."""
+        if visible and self.seen is None:
+            self.seen = (time, world)
+        state = np.concatenate([radiance(self.prim, time), np.round(unscaled(world), 6).ravel()]) * float(visible)
+        self.states.add((state + 0.0).tobytes())
+
+
 def write_dome(prim: Usd.Prim, time: Usd.TimeCode, world: np.ndarray, up: str, target: Path, lost: Lost) -> dict[str, Any]:
     """A dome light as `extras.buzz.world`. `world` is its matrix in glTF's space, scale aside."""
     path = str(prim.GetPath())
