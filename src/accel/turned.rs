@@ -1,7 +1,7 @@
 //! Surfaces that open to the eye between two views.
 
 use super::{Accel, opacity};
-use crate::scene::{Scene, View};
+use crate::scene::{Scene, Shape, View};
 use glam::{DVec3, Vec3, Vec3A};
 use rayon::prelude::*;
 
@@ -9,7 +9,7 @@ use rayon::prelude::*;
 const CHUNK: usize = 8192;
 
 impl Accel {
-    /// Visits, in any order, the corners, relative to the origin, of every triangle whose plane the eye crosses between two
+    /// Visits, in any order, the corners, relative to the origin, of every triangle, those of flat shapes too, whose plane the eye crosses between two
     /// views to look at a visible side, or from which it moves away by as much as it was before it at first: the old view
     /// showed it as a line, or through its culled back not at all.
     pub fn turned(&self, scene: &Scene, (old, new): (&View, &View), visit: &(dyn Fn([Vec3; 3]) + Sync)) {
@@ -29,8 +29,7 @@ impl Accel {
                 (at, w)
             });
             let positions = self.positions(index, mesh);
-            let look = |triangle: &[u32; 3]| {
-                let [a, b, c] = triangle.map(|i| Vec3A::from(positions[i as usize]));
+            let look = |[a, b, c]: [Vec3A; 3]| {
                 let normal = (b - a).cross(c - a) * placement.winding;
                 let before = |(at, w): (Vec3A, f32)| normal.dot(at - a * w);
                 let (was, is) = (before(old), before(new));
@@ -39,8 +38,11 @@ impl Accel {
                     visit([a, b, c].map(|p| placement.render_from_object.transform_point3a(p).into()));
                 }
             };
-            let present: &[[u32; 3]] = if placement.present { &mesh.triangles } else { &[] };
-            present.par_iter().with_min_len(CHUNK).for_each(look);
+            if placement.present {
+                let corners = |triangle: &[u32; 3]| triangle.map(|i| Vec3A::from(positions[i as usize]));
+                mesh.triangles.par_iter().with_min_len(CHUNK).map(corners).for_each(look);
+                mesh.shape.iter().flat_map(Shape::sheet).map(|t| t.map(Vec3A::from)).for_each(look);
+            }
         };
         (0..scene.instances.len()).into_par_iter().for_each(of_instance);
     }

@@ -11,7 +11,7 @@ use crate::{
     Result,
     scene::{Camera, Channel, Curve, Interpolation, Light, LocalTransform, Node, Target},
 };
-use std::{collections::HashMap, f32::consts::FRAC_PI_2};
+use std::collections::HashMap;
 
 /// What channels may aim at.
 pub(super) struct Targets<'a> {
@@ -156,9 +156,17 @@ fn pointer_aim(pointer: &str, element: &Element, targets: &Targets, notes: &Note
         _ => None,
     };
     if aim.is_none() {
-        notes.add(format!("animation of {pointer}"), element.place.clone(), "it stays as it is at rest");
+        // The place says which; each kind is noted once.
+        let kind: Vec<&str> =
+            pointer.split('/').map(|p| if p.parse::<u32>().is_ok() { "*" } else { p }).collect();
+        let feature = format!("animation of {}", kind.join("/"));
+        notes.add(feature, element.place.clone(), "it stays as it is at rest");
     }
-    aim.filter(|aim| !aim.targets.is_empty())
+    if aim.as_ref().is_some_and(|aim| aim.targets.is_empty()) {
+        notes.add("animation of what is not in the scene", element.place.clone(), "it moves nothing");
+        return None;
+    }
+    aim
 }
 
 /// Reads a sampler's values and drops keys that cannot be used; none if no key is left.
@@ -232,17 +240,9 @@ fn curve(
 /// The curve in the scene's units and within the property's bounds.
 fn fit(target: Target, curve: &Curve) -> Curve {
     let mut curve = curve.clone();
-    // The tangents of cubic splines scale with their values, and are not bounded as they are.
+    // The tangents of cubic splines scale with their values, and are not bounded as they are: what they swing to is.
     let tangents = curve.interpolation == Interpolation::CubicSpline;
-    let bounds = match target {
-        Target::CameraYfov(_) => (1e-4, std::f32::consts::PI - 1e-4),
-        Target::CameraXmag(_) | Target::CameraYmag(_) => (1e-9, f32::MAX),
-        Target::CameraNear(_) | Target::LightColor(_) | Target::LightIntensity(_) => (0.0, f32::MAX),
-        Target::LightInnerCone(_) => (0.0, FRAC_PI_2),
-        Target::LightOuterCone(_) => (1e-4, FRAC_PI_2),
-        Target::LightSize(_) | Target::LightArea(_) => (0.0, f32::MAX),
-        _ => (f32::MIN, f32::MAX),
-    };
+    let bounds = target.bounds();
     let factor = if matches!(target, Target::LightIntensity(_)) { LUMENS_PER_WATT.recip() } else { 1.0 };
     for (i, value) in curve.values.iter_mut().enumerate() {
         let is_tangent = tangents && i / curve.width % 3 != 1;

@@ -1,8 +1,9 @@
 //! What the samples that landed around a pixel say about it: whether they lie on one surface, and which lights reach it.
 
-use super::buzz_buffer::{BuzzBuffer, Projector};
+use super::buzz_buffer::BuzzBuffer;
 use super::cell::Cell;
 use super::centre::CastCentres;
+use super::projector::Projector;
 use super::sources::{MOVED, NOTHING, SUSPECT, Sources};
 use crate::frame::SurfaceSample;
 use glam::Vec3;

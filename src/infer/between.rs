@@ -12,8 +12,9 @@
 //! met in another, whose steps begin elsewhere, and from there [followed](super::outlines).
 
 use super::around::Tangent;
-use super::buzz_buffer::{Projector, Row, UNKNOWN};
+use super::buzz_buffer::{Row, UNKNOWN};
 use super::centre::CastCentres;
+use super::projector::Projector;
 use crate::frame::SurfaceSample;
 
 /// One pixel of a row in so many is cast and asks for itself.

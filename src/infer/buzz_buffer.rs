@@ -1,10 +1,11 @@
 //! The Buzzbuffer: a window-sized store of samples, the paper's data structure and its namesake.
 
 use super::moved::Motion;
+use super::projector::Projector;
 use super::subpixel::SubPixels;
 use crate::frame::{PackedNormal, PixelClass, RayCounts, SurfaceRef, SurfaceSample};
 use crate::scene::View;
-use glam::{DVec3, Mat4, Vec3};
+use glam::Vec3;
 use rayon::prelude::*;
 
 /// The object tag of a pixel about which nothing is known yet (the paper's id_tag -2).
@@ -18,7 +19,9 @@ pub struct BuzzBuffer {
     width: usize,
     height: usize,
     lit_words: usize,
-    /// Planar depth in the view that the buffer was made for; infinite for the background.
+    /// [`Projector::side`] of the view that the buffer was made for; 0 before it was made for any.
+    pub(super) side: f32,
+    /// Planar depth in that view, metres; infinite for the background.
     pub z: Vec<f32>,
     /// See [`SurfaceSample::position`].
     pub position: Vec<Vec3>,
@@ -44,6 +47,7 @@ impl BuzzBuffer {
             width,
             height,
             lit_words,
+            side: 0.0,
             z: vec![f32::INFINITY; n],
             position: vec![Vec3::ZERO; n],
             object: vec![UNKNOWN; n],
@@ -119,6 +123,7 @@ impl BuzzBuffer {
     /// Becomes the same as `other`, in the memory that it has.
     pub(super) fn copy_from(&mut self, other: &Self) {
         (self.width, self.height, self.lit_words) = (other.width, other.height, other.lit_words);
+        self.side = other.side;
         self.z.clone_from(&other.z);
         self.position.clone_from(&other.position);
         self.object.clone_from(&other.object);
@@ -146,6 +151,7 @@ impl BuzzBuffer {
 
     /// Casts a ray through the centre of every pixel that is unknown; if the caster is cancelled, some stay so.
     pub fn cast_unknown(&mut self, projector: &Projector, rays: &impl CastRays) -> RayCounts {
+        self.side = projector.side();
         let cast_row = |y: usize, mut row: Row<'_>| {
             let mut counts = RayCounts::default();
             if rays.is_cancelled() {
@@ -296,140 +302,5 @@ pub trait CastRays: Sync {
     /// What differs beside the camera from the frame that is inferred from; by default nothing.
     fn motion(&self) -> Option<&dyn Motion> {
         None
-    }
-}
-
-/// The paper's four by four matrix and perspective division: where a stored hit lies in a view.
-///
-/// Single precision on coordinates relative to `origin` (the segment's first eye): 1e-4 pixel for hits as far away
-/// as they like, as long as the eye stays within some 10^4 times the distance of the nearest thing seen.
-#[derive(Debug, Clone, Copy)]
-pub struct Projector {
-    raster_from_world: Mat4,
-    eye: Vec3,
-    forward: Vec3,
-    perspective: bool,
-    near: f32,
-    far: f32,
-    width: f32,
-    height: f32,
-    columns: usize,
-    /// Side of a pixel at planar depth 1, or anywhere in parallel projection.
-    pixel: f32,
-}
-
-/// Where a sample lies in a view.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Projected {
-    /// Raster coordinates.
-    pub x: f32,
-    /// Raster coordinates.
-    pub y: f32,
-    /// Planar depth; infinite for the background.
-    pub z: f32,
-}
-
-impl Projector {
-    /// The projection of `view` for positions relative to `origin`.
-    pub fn new(view: &View, origin: DVec3) -> Self {
-        Self {
-            raster_from_world: view.raster_from_world(origin).as_mat4(),
-            eye: (view.eye - origin).as_vec3(),
-            forward: view.forward.as_vec3(),
-            perspective: view.is_perspective(),
-            near: view.lens.near as f32,
-            far: view.lens.far as f32,
-            width: view.width as f32,
-            height: view.height as f32,
-            columns: view.width as usize,
-            pixel: view.pixel_size() as f32,
-        }
-    }
-
-    /// Where the sample appears, or none where it is behind the eye, clipped, or turned away.
-    pub fn project(&self, position: Vec3, normal: Vec3, background: bool) -> Option<Projected> {
-        if background {
-            // Infinitely far away: only the direction counts. Parallel rays give it no place.
-            let r = self.raster_from_world * position.extend(0.0);
-            let seen = self.perspective && r.w > 0.0;
-            return seen.then(|| Projected { x: r.x / r.w, y: r.y / r.w, z: f32::INFINITY });
-        }
-        let r = self.raster_from_world * position.extend(1.0);
-        let seen = r.z >= self.near && r.z <= self.far && r.w > 0.0 && self.faces(position, normal);
-        seen.then(|| Projected { x: r.x / r.w, y: r.y / r.w, z: r.z })
-    }
-
-    /// The raster column, with its fraction, of a point before the eye or a direction towards the background.
-    pub(super) fn column(&self, position: Vec3, background: bool) -> f32 {
-        let r = self.raster_from_world * position.extend(if background { 0.0 } else { 1.0 });
-        r.x / r.w
-    }
-
-    /// True if a point's surface is turned to the eye.
-    pub(super) fn faces(&self, position: Vec3, normal: Vec3) -> bool {
-        self.direction_to(position).dot(normal) < 0.0
-    }
-
-    /// Planar depth of a sample; infinite for the background.
-    #[inline]
-    pub fn depth(&self, sample: &SurfaceSample) -> f32 {
-        if sample.surface.is_background() {
-            f32::INFINITY
-        } else {
-            (self.raster_from_world * sample.position.extend(1.0)).z
-        }
-    }
-
-    /// Side of a pixel at a point's depth, metres.
-    pub fn pixel_width(&self, position: Vec3) -> f32 {
-        let depth = if self.perspective { (position - self.eye).dot(self.forward).abs() } else { 1.0 };
-        self.pixel * depth
-    }
-
-    /// Number of the pixel that holds raster position (x, y), if it is in the window.
-    pub fn pixel(&self, x: f32, y: f32) -> Option<usize> {
-        let inside = x >= 0.0 && y >= 0.0 && x < self.width && y < self.height;
-        inside.then(|| y as u32 as usize * self.columns + x as u32 as usize)
-    }
-
-    /// The direction in which a ray of this view passes through `position`; not normalised.
-    pub(super) fn direction_to(&self, position: Vec3) -> Vec3 {
-        if self.perspective { position - self.eye } else { self.forward }
-    }
-
-    /// The line on which the sample is seen, from it to the eye or the other way: from where, along what, how many times as
-    /// far. It begins at the sample, but for the background.
-    pub(super) fn line_to(&self, sample: &SurfaceSample) -> (Vec3, Vec3, f32) {
-        match (self.perspective, sample.surface.is_background()) {
-            (true, true) => (self.eye, sample.position, f32::INFINITY),
-            (true, false) => (sample.position, self.eye - sample.position, 1.0),
-            (false, _) => (sample.position, -self.forward, f32::INFINITY),
-        }
-    }
-
-    /// A number that is another in every view, as if by chance.
-    pub(super) fn scatter(&self) -> u64 {
-        let bits = self.raster_from_world.to_cols_array().map(f32::to_bits);
-        // FNV-1a by words, then its well-mixed half.
-        let hash = bits.into_iter().fold(0xcbf2_9ce4_8422_2325_u64, |hash, word| {
-            (hash ^ u64::from(word)).wrapping_mul(0x0100_0000_01b3)
-        });
-        (hash ^ hash >> 29).wrapping_mul(0xbf58_476d_1ce4_e5b9) >> 32
-    }
-
-    pub(super) fn raster_from_world(&self) -> &Mat4 {
-        &self.raster_from_world
-    }
-
-    pub(super) fn is_perspective(&self) -> bool {
-        self.perspective
-    }
-
-    pub(super) fn near(&self) -> f32 {
-        self.near
-    }
-
-    pub(super) fn size(&self) -> (f32, f32) {
-        (self.width, self.height)
     }
 }

@@ -1,12 +1,13 @@
 //! Reverse reprojection (Nehab et al. 2007) without a second projection: where in the old image the point was that is at a
 //! pixel's centre now.
 //!
-//! A sample nearby says how its surface has moved over the image. Between two frames an image hardly turns or grows, so the
-//! point at the centre has moved as far, and was between four old pixels: its *cell*. An outline, or the edge of a shadow,
-//! is known to lie between two old pixels; so where all four say the same, neither passes here.
+//! A sample nearby says how its surface has moved over the image, and how it has grown there. Between two frames an image hardly
+//! turns, so the point at the centre has moved alike, and was between four old pixels: its *cell*. An outline, or the edge of a
+//! shadow, is known to lie between two old pixels; so where all four say the same, neither passes here.
 
-use super::buzz_buffer::{BuzzBuffer, Projector};
+use super::buzz_buffer::BuzzBuffer;
 use super::centre::CastCentres;
+use super::projector::Projector;
 use glam::Vec2;
 
 /// Four old pixels, in rows, and where between their centres a point lies.
@@ -27,7 +28,15 @@ pub(super) fn place_before(
 ) -> Option<Vec2> {
     let landed = view.project(old.position[i], old.normal[i].direction(), old.surface[i].is_background())?;
     let was = Vec2::new((i % old.width()) as f32, (i / old.width()) as f32);
-    Some(was + Vec2::new(x as f32, y as f32) + 0.5 - Vec2::new(landed.x, landed.y))
+    let beside = Vec2::new(x as f32, y as f32) + 0.5 - Vec2::new(landed.x, landed.y);
+    Some(was + beside * growth(old, view, i, landed.z))
+}
+
+/// How many old pixels as wide as one of the view's is where the surface of old sample `i` is seen, now at depth `z`.
+fn growth(old: &BuzzBuffer, view: &Projector, i: usize, z: f32) -> f32 {
+    let nearer = if view.is_perspective() && z.is_finite() { z / old.z[i] } else { 1.0 };
+    let growth = nearer * view.side() / old.side;
+    if growth.is_finite() { growth } else { 1.0 }
 }
 
 impl Cell {

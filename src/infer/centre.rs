@@ -22,11 +22,12 @@
 use super::Marks;
 use super::alike::{Alike, AlikeRow};
 use super::around::{Around, Trust, believes_cells};
-use super::buzz_buffer::{BuzzBuffer, CastRays, Projector, UNKNOWN};
+use super::buzz_buffer::{BuzzBuffer, CastRays, Row, UNKNOWN};
 use super::cast::Pass;
 use super::frontier::Frontier;
 use super::outlines::Outlines;
 use super::project::Landings;
+use super::projector::Projector;
 use super::shadow_edges::ShadowEdges;
 use super::shares::{carry, spare};
 use super::sources::Sources;
@@ -122,15 +123,6 @@ pub trait CastCentres: CastRays {
 /// So many samples must be known in the 3x3 around a pixel before it is filled from them.
 pub(super) const ENOUGH_TO_FILL: usize = 3;
 
-/// The class of a pixel, by what landed on it and by what was found at its centre; else `class`.
-fn class_of<L, C>(landed: Option<L>, centred: Option<C>, class: PixelClass) -> PixelClass {
-    match (landed, centred) {
-        (None, Some(_)) => PixelClass::Filled,
-        (Some(_), None) => PixelClass::Edge,
-        _ => class,
-    }
-}
-
 /// What re-centring holds between frames, so that nothing is allocated for each.
 #[derive(Debug, Default)]
 pub struct Centring {
@@ -166,86 +158,43 @@ impl Centring {
         new: &mut BuzzBuffer,
     ) {
         self.sources.settle(old, landings, marks);
+        new.side = view.side();
         let (width, words) = (old.width(), old.lit_words());
         // Without lights there are no words, but a chunk's length may not be zero.
         for bits in [&mut self.ask, &mut self.doubt] {
             bits.resize((old.object.len() * words).max(old.height()), 0);
         }
-        let sources = &self.sources;
         let bits = |bits| <[u32]>::par_chunks_mut(bits, (width * words).max(1));
         let rows = new.rows_mut().zip(bits(&mut self.ask)).zip(bits(&mut self.doubt));
+        let recentring = Recentring { old, sources: &self.sources, view, rays, trust };
         rows.enumerate().for_each(|(y, ((mut row, ask), doubt))| {
             ask.fill(0);
             doubt.fill(if rays.has_shares() { u32::MAX } else { 0 });
             let mut memory = R::Memory::default();
-            let mut alike = AlikeRow::new(old, sources, rays, trust, y);
+            let mut alike = AlikeRow::new(old, recentring.sources, rays, trust, y);
             for x in 0..width {
                 let pixel = y * width + x;
                 let [ask, doubt] = [&mut *ask, &mut *doubt].map(|bits| &mut bits[x * words..][..words]);
-                let own = sources.of(pixel);
+                let own = recentring.sources.of(pixel);
                 row.object[x] = UNKNOWN;
                 row.class[x] = match (own, marks.get(pixel)) {
                     (None, Some(PixelClass::Entering)) => PixelClass::Entering,
                     (None, _) => PixelClass::Missed,
                     (_, mark) => mark.unwrap_or(PixelClass::Good),
                 };
-                let mut reuse = |i: usize, sample: &SurfaceSample| {
-                    row.put(x, view, sample);
-                    row.put_lit(x, old.lit(i));
-                };
                 // Within a triangle that is lit alike all around there is no more to find out.
-                if let Some(Alike { source, centre, same }) = alike.at(x, &mut memory) {
-                    if let Some(sample) = centre {
-                        reuse(source, &sample);
-                        if !same {
-                            carry((old, source), view, (x, y), &sample, rays, (row.lit_mut(x), ask));
-                            spare((x, y), trust, rays, ask);
-                        }
-                    }
-                    row.class[x] = class_of(own, centre, row.class[x]);
+                let centred = if let Some(alike) = alike.at(x, &mut memory) {
+                    recentring.take((x, y), alike, &mut row, ask)
+                } else if recentring.sources.is_suspect(pixel) {
                     continue;
-                }
-                if sources.is_suspect(pixel) {
-                    continue;
-                }
-                let around = Around::new(old, view, sources, (x, y), 1);
-                if let Some(i) = own
-                    && around.stands_still()
-                {
-                    reuse(i, &old.sample(i));
-                    continue;
-                }
-                let nearby = || around.known().next().filter(|_| around.known().count() >= ENOUGH_TO_FILL);
-                let centred = own.or_else(nearby).and_then(|i| {
-                    let triangles = around.surface_of(i, trust)?;
-                    let candidates = triangles.iter().map(|k| old.sample(k));
-                    let sample = rays.nearest_of(x, y, candidates, &mut memory)?;
-                    Some((i, sample))
-                });
-                if let Some((i, sample)) = centred {
-                    reuse(i, &sample);
-                    // Where it is the very sample that landed here, its lights are known.
-                    if !sources.is_centred(pixel) && !around.is_lit_alike() {
-                        // On a chess board: what is wrong here is asked beside it.
-                        let is_believed = (x + y) % 2 == 0 && believes_cells(trust, rays);
-                        match is_believed.then(|| around.cell(i)).flatten() {
-                            Some(cell) => cell.lend(old, rays, row.lit_mut(x), ask),
-                            None => {
-                                doubt.fill(u32::MAX);
-                                // A hole may hide a shadow's edge: then look farther.
-                                let wide = || Around::new(old, view, sources, (x, y), 2);
-                                let around = if around.is_complete() { around } else { wide() };
-                                around.disagreement(i, rays, trust, ask);
-                            }
-                        }
-                        if rays.has_shares() {
-                            rays.soften(ask);
-                            carry((old, i), view, (x, y), &sample, rays, (row.lit_mut(x), ask));
-                            spare((x, y), trust, rays, ask);
-                        }
-                    }
-                }
-                row.class[x] = class_of(own, centred, row.class[x]);
+                } else {
+                    recentring.centre((x, y), &mut row, (ask, doubt), &mut memory)
+                };
+                row.class[x] = match (own, centred) {
+                    (None, Some(())) => PixelClass::Filled,
+                    (Some(_), None) => PixelClass::Edge,
+                    _ => row.class[x],
+                };
             }
         });
     }
@@ -269,5 +218,96 @@ impl Centring {
         }
         counts += self.shadow_edges.follow(frontier, new, view, (&mut self.ask, &mut self.doubt), rays);
         counts
+    }
+}
+
+/// What re-centring a frame goes by.
+struct Recentring<'a, R> {
+    old: &'a BuzzBuffer,
+    sources: &'a Sources,
+    view: &'a Projector,
+    rays: &'a R,
+    trust: Trust,
+}
+
+impl<R: CastCentres> Recentring<'_, R> {
+    /// Stores what is at the centre of a pixel around which all is alike, if anything is.
+    #[inline]
+    fn take(&self, pixel: (usize, usize), alike: Alike, row: &mut Row<'_>, ask: &mut [u32]) -> Option<()> {
+        let (x, sample) = (pixel.0, alike.centre?);
+        self.reuse(x, alike.source, &sample, row);
+        if !alike.same {
+            carry((self.old, alike.source), self.view, pixel, &sample, self.rays, (row.lit_mut(x), ask));
+            spare(pixel, self.trust, self.rays, ask);
+        }
+        Some(())
+    }
+
+    /// Finds and stores what is at the centre of a pixel among the surfaces around it, if that is certain, and sets the bits of the
+    /// lights to ask there, and of those in doubt.
+    fn centre(
+        &self,
+        (x, y): (usize, usize),
+        row: &mut Row<'_>,
+        (ask, doubt): (&mut [u32], &mut [u32]),
+        memory: &mut R::Memory,
+    ) -> Option<()> {
+        let pixel = y * self.old.width() + x;
+        let own = self.sources.of(pixel);
+        let around = Around::new(self.old, self.view, self.sources, (x, y), 1);
+        if let Some(i) = own
+            && around.stands_still()
+        {
+            self.reuse(x, i, &self.old.sample(i), row);
+            return Some(());
+        }
+        let nearby = || around.known().next().filter(|_| around.known().count() >= ENOUGH_TO_FILL);
+        let i = own.or_else(nearby)?;
+        let candidates = around.surface_of(i, self.trust)?;
+        let candidates = candidates.iter().map(|k| self.old.sample(k));
+        let sample = self.rays.nearest_of(x, y, candidates, memory)?;
+        self.reuse(x, i, &sample, row);
+        // Where it is the very sample that landed here, its lights are known.
+        if !self.sources.is_centred(pixel) && !around.is_lit_alike() {
+            self.light((x, y), (i, &sample), around, row, (ask, doubt));
+        }
+        Some(())
+    }
+
+    /// Settles which lights reach `sample`, at the centre of a pixel on the surface of old sample `i`, as far as the samples around
+    /// agree; sets the bits of those to ask, and of those in doubt.
+    fn light(
+        &self,
+        (x, y): (usize, usize),
+        (i, sample): (usize, &SurfaceSample),
+        around: Around<'_>,
+        row: &mut Row<'_>,
+        (ask, doubt): (&mut [u32], &mut [u32]),
+    ) {
+        let Self { old, sources, view, rays, trust } = *self;
+        // On a chess board: what is wrong here is asked beside it.
+        let is_believed = (x + y) % 2 == 0 && believes_cells(trust, rays);
+        match is_believed.then(|| around.cell(i)).flatten() {
+            Some(cell) => cell.lend(old, rays, row.lit_mut(x), ask),
+            None => {
+                doubt.fill(u32::MAX);
+                // A hole may hide a shadow's edge: then look farther.
+                let wide = || Around::new(old, view, sources, (x, y), 2);
+                let around = if around.is_complete() { around } else { wide() };
+                around.disagreement(i, rays, trust, ask);
+            }
+        }
+        if rays.has_shares() {
+            rays.soften(ask);
+            carry((old, i), view, (x, y), sample, rays, (row.lit_mut(x), ask));
+            spare((x, y), trust, rays, ask);
+        }
+    }
+
+    /// Stores a sample with the shadow bits of old sample `i`.
+    #[inline]
+    fn reuse(&self, x: usize, i: usize, sample: &SurfaceSample, row: &mut Row<'_>) {
+        row.put(x, self.view, sample);
+        row.put_lit(x, self.old.lit(i));
     }
 }

@@ -77,7 +77,7 @@ fn is_same_surface(buffer: &BuzzBuffer, a: usize, b: usize) -> bool {
     buffer.object[a] == buffer.object[b] && far <= near * DEPTH_STEP
 }
 
-/// True where both pixels hold samples that came from neighbouring pixels of the old image.
+/// True where what landed on both pixels came from neighbouring pixels of the old image, kept or cast since.
 fn were_neighbours(landings: &Landings, a: usize, b: usize, width: usize) -> bool {
     let (Some(a), Some(b)) = (landings.source(a), landings.source(b)) else { return false };
     (a / width).abs_diff(b / width) <= NEIGHBOURS && (a % width).abs_diff(b % width) <= NEIGHBOURS

@@ -8,9 +8,10 @@
 //! Past the paper, for samples at pixel centres, less is enough: [`at_sides`].
 
 use super::Marks;
-use super::buzz_buffer::{BuzzBuffer, Projector};
+use super::buzz_buffer::BuzzBuffer;
 use super::cell::place_before;
 use super::project::{AT_CENTRE, Landings};
+use super::projector::Projector;
 use crate::frame::PixelClass;
 use crate::scene::View;
 use glam::{DVec3, DVec4, Vec2};
@@ -56,10 +57,11 @@ pub fn entering(old: &View, new: &View, k: f64, marks: &Marks) {
     });
 }
 
-/// Marks the pixels at the sides of the image whose centre was not between old ones (past the paper).
+/// Marks the pixels at the sides of the image whose centre was not between old ones, or on which nothing landed (past the paper).
 ///
 /// Whatever comes in passes there, if it does so by less than a pixel a frame and no pixel is missed. Where a ray meets it,
-/// it is [followed](super::outlines) from there as far as it goes, however near it is; so there is no contested area.
+/// it is [followed](super::outlines) from there as far as it goes, however near it is; so there is no contested area. So are the
+/// edges of shadows that come in.
 pub(super) fn at_sides(old: &BuzzBuffer, view: &Projector, landings: &Landings, marks: &Marks) {
     let (width, height) = (old.width(), old.height());
     let last = Vec2::new(width as f32, height as f32) - 1.0;
@@ -68,7 +70,7 @@ pub(super) fn at_sides(old: &BuzzBuffer, view: &Projector, landings: &Landings, 
     let mark = |x: usize, y: usize| {
         let pixel = y * width + x;
         let place = landings.source(pixel).and_then(|i| place_before(old, view, i, (x, y)));
-        if place.is_some_and(|p| p.cmplt(-slack).any() || p.cmpgt(last + slack).any()) {
+        if place.is_none_or(|p| p.cmplt(-slack).any() || p.cmpgt(last + slack).any()) {
             marks.set(pixel, PixelClass::Entering);
         }
     };

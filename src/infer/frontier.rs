@@ -16,11 +16,13 @@ pub(super) struct Frontier {
     /// Pixels to look at, in order; those to look at next.
     pixels: Vec<u32>,
     next: Vec<u32>,
+    /// For each pixel, whether it is among the next: false between two calls.
+    queued: Vec<bool>,
 }
 
 impl Frontier {
     /// What it holds for each pixel, if it begins with all.
-    pub const BYTES_PER_PIXEL: usize = 3 * size_of::<u32>();
+    pub const BYTES_PER_PIXEL: usize = 3 * size_of::<u32>() + size_of::<bool>();
 
     /// Begins with the pixels of `buffer` that are `wanted`. Stretches within a row are left out where none is: those that are
     /// `even`, which is asked first.
@@ -34,6 +36,7 @@ impl Frontier {
         // Memory for as many pixels as there can be; what is not written to costs nothing.
         self.rows.resize(width * height, 0);
         self.found.resize(height, 0);
+        self.queued.resize(width * height, false);
         for list in [&mut self.pixels, &mut self.next] {
             list.clear();
             list.reserve(width * height);
@@ -68,14 +71,16 @@ impl Frontier {
         mut moves: impl FnMut(usize) -> bool,
         mut wanted: impl FnMut(usize) -> bool,
     ) {
-        self.next.clear();
-        for pixel in self.pixels.iter().map(|&pixel| pixel as usize).filter(|&pixel| moves(pixel)) {
+        let Self { pixels, next, queued, .. } = self;
+        next.clear();
+        for pixel in pixels.iter().map(|&pixel| pixel as usize).filter(|&pixel| moves(pixel)) {
             let block = pixels_around(width, height, pixel).chain([pixel]);
-            self.next.extend(block.map(|pixel| pixel as u32));
+            let new = block.filter(|&pixel| !std::mem::replace(&mut queued[pixel], true));
+            next.extend(new.map(|pixel| pixel as u32));
         }
-        self.next.sort_unstable();
-        self.next.dedup();
-        self.next.retain(|&pixel| wanted(pixel as usize));
-        std::mem::swap(&mut self.pixels, &mut self.next);
+        next.iter().for_each(|&pixel| queued[pixel as usize] = false);
+        next.sort_unstable();
+        next.retain(|&pixel| wanted(pixel as usize));
+        std::mem::swap(pixels, next);
     }
 }

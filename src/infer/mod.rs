@@ -25,6 +25,7 @@ mod alike;
 mod around;
 mod between;
 mod buzz_buffer;
+mod carried;
 mod cast;
 mod cell;
 mod centre;
@@ -36,6 +37,7 @@ mod moved;
 mod obscured;
 mod outlines;
 mod project;
+mod projector;
 mod seen;
 mod shadow_edges;
 mod shares;
@@ -47,7 +49,7 @@ mod turned;
 mod voxels;
 
 pub use around::{Trust, is_one_surface};
-pub use buzz_buffer::{BuzzBuffer, CastRays, Projected, Projector, UNKNOWN};
+pub use buzz_buffer::{BuzzBuffer, CastRays, UNKNOWN};
 pub use centre::{CastCentres, Centring};
 pub use creeping::{Along, creeping};
 pub use entering::entering;
@@ -55,6 +57,7 @@ pub use lattice::{Cells, Lattice, Position};
 pub use moved::{Body, Motion};
 pub use obscured::obscured;
 pub use project::{Landings, gather, project};
+pub use projector::{Projected, Projector};
 pub use seen::SeenLight;
 pub use stereo::{Parallax, in_gaps, other_eye};
 pub use subpixel::{Level, Samples, SubPixels};
@@ -83,6 +86,9 @@ pub struct Inference {
     /// The old samples where their surfaces are now; used only where something moves.
     now: BuzzBuffer,
 }
+
+/// Of a view that begins at the eye, nothing nearer is taken to come in, metres.
+const NEAREST: f64 = 1e-6;
 
 /// What lies between the old view and the new.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -114,8 +120,8 @@ impl Inference {
 
     /// Makes `new`, the samples of `new_view`, from `old`, those of `old_view`. Positions are relative to `origin`.
     ///
-    /// Every sample that is reused lies inside its pixel's square (the half-pixel guarantee), and no old hit is known
-    /// to hide something before it; every other pixel is traced through its centre.
+    /// Every sample that is reused lies inside its pixel's square (the half-pixel guarantee), and no line L, on which an old hit
+    /// may hide something, passes before it; every other pixel is traced through its centre. `origin` is in world metres.
     pub fn infer(
         &mut self,
         by: Move,
@@ -133,10 +139,10 @@ impl Inference {
             Move::Camera => obscured(old, &Projector::new(old_view, origin), &to, landings, marks),
             Move::OtherEye => in_gaps(old, &Parallax::between(old_view, new_view, origin), landings, marks),
         }
-        // Clear the contested area, where new objects may come in: k is the nearest that is known.
-        if let Some(k) = nearest {
-            entering(old_view, new_view, f64::from(k), marks);
-        }
+        // Clear the contested area, where new objects may come in: k is the nearest that is known. Where that is only sky,
+        // anything may, as near as the view begins.
+        let k = nearest.map_or(new_view.lens.near.max(NEAREST), f64::from);
+        entering(old_view, new_view, k, marks);
         let old = if rides(rays.motion()) { &self.now } else { old };
         gather(old, &self.landings, &self.marks, new);
 

@@ -11,8 +11,9 @@
 //! store a bit; so a shadow that something else casts too is asked for more often than need be.
 
 use super::Marks;
-use super::buzz_buffer::{BuzzBuffer, Projector, Row, UNKNOWN};
+use super::buzz_buffer::{BuzzBuffer, Row, UNKNOWN};
 use super::project::Landings;
+use super::projector::Projector;
 use super::voxels::{Voxels, clip};
 use crate::frame::{LightWay, PixelClass, RayCounts, SurfaceSample, Way};
 use glam::Vec3;
@@ -163,8 +164,10 @@ impl<'a> Askers<'a> {
             Way::From(position, radius) => {
                 let along = position - point;
                 let distance = along.length();
-                let narrow = radius / distance;
-                voxels.any(|v| is_in_cone(v, point, along / distance, narrow, distance + radius))
+                // The tangent of the angle whose sine is radius / distance.
+                let tangent = radius / (distance * distance - radius * radius).max(0.0).sqrt();
+                let until = distance + radius;
+                distance <= radius || voxels.any(|v| is_in_cone(v, point, along / distance, tangent, until))
             }
             Way::Along(direction, tangent) => {
                 voxels.any(|v| is_in_cone(v, point, direction, tangent, f32::INFINITY))

@@ -10,8 +10,9 @@
 //! surface, the lines of its rim bound the hidden volume already.
 
 use super::Marks;
-use super::buzz_buffer::{BuzzBuffer, Projector, UNKNOWN, pixels_around};
+use super::buzz_buffer::{BuzzBuffer, UNKNOWN, pixels_around};
 use super::project::Landings;
+use super::projector::Projector;
 use crate::frame::PixelClass;
 use glam::{Vec2, Vec4};
 use rayon::prelude::*;

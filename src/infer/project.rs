@@ -1,7 +1,8 @@
 //! Projection of the old samples into the new view: the nearest hit on a pixel wins.
 
 use super::Marks;
-use super::buzz_buffer::{BuzzBuffer, Projected, Projector, UNKNOWN};
+use super::buzz_buffer::{BuzzBuffer, UNKNOWN};
+use super::projector::{Projected, Projector};
 use crate::frame::PixelClass;
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
@@ -35,13 +36,13 @@ impl Landings {
     pub(super) fn land(&self, pixel: usize, at: Projected, i: usize, marks: &Marks) {
         // Within the window the integer part is the floor, for which there would be a call.
         let is_away = |raster: f32| (raster - raster as i32 as f32 - 0.5).abs() >= AT_CENTRE;
-        if self.land_beside(pixel, at.z, i, is_away(at.x) || is_away(at.y)) {
+        if self.land_at(pixel, at.z, i, is_away(at.x) || is_away(at.y)) {
             marks.set(pixel, PixelClass::Overlapped);
         }
     }
 
     /// Lands a sample at depth `z`, `away` from the pixel's centre or not, and says whether another is there.
-    pub(super) fn land_beside(&self, pixel: usize, z: f32, i: usize, away: bool) -> bool {
+    pub(super) fn land_at(&self, pixel: usize, z: f32, i: usize, away: bool) -> bool {
         let landing = u64::from(z.to_bits()) << 32 | (i as u64) << 1 | u64::from(away);
         self.0[pixel].fetch_min(landing, Relaxed) != EMPTY
     }

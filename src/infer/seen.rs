@@ -4,8 +4,9 @@
 //! image as well need not ask the lights again.
 
 use super::around::Tangent;
-use super::buzz_buffer::{BuzzBuffer, Projector};
+use super::buzz_buffer::BuzzBuffer;
 use super::cell::Cell;
+use super::projector::Projector;
 use crate::frame::SurfaceSample;
 use crate::scene::View;
 use glam::{DVec3, Vec2};

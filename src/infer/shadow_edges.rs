@@ -7,9 +7,10 @@
 //! its end.
 
 use super::around::is_one_surface;
-use super::buzz_buffer::{BuzzBuffer, Projector, pixels_around};
+use super::buzz_buffer::{BuzzBuffer, pixels_around};
 use super::centre::CastCentres;
 use super::frontier::Frontier;
+use super::projector::Projector;
 use crate::frame::RayCounts;
 use rayon::prelude::*;
 use std::ops::Range;

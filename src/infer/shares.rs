@@ -6,9 +6,10 @@
 //! that averages the noise of what few rays have found.
 
 use super::around::{Tangent, Trust};
-use super::buzz_buffer::{BuzzBuffer, Projector};
+use super::buzz_buffer::BuzzBuffer;
 use super::cell::place_before;
 use super::centre::CastCentres;
+use super::projector::Projector;
 use crate::frame::SurfaceSample;
 
 /// Interpolates into `lit` the shares of `sample`, at the centre of `pixel` (x, y), near which the sample of old pixel `i`

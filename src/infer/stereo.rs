@@ -8,9 +8,10 @@
 //! in a gap stays if it is nearer than anything that was hidden could be there.
 
 use super::Marks;
-use super::buzz_buffer::{BuzzBuffer, Projected, Projector};
+use super::buzz_buffer::BuzzBuffer;
 use super::obscured::DEPTH_STEP;
 use super::project::Landings;
+use super::projector::{Projected, Projector};
 use crate::frame::PixelClass;
 use crate::scene::View;
 use glam::DVec3;

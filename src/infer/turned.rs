@@ -5,37 +5,40 @@
 //! whatever lies behind such a surface on the new image is not to be believed.
 
 use super::Marks;
-use super::buzz_buffer::Projector;
 use super::project::Landings;
+use super::projector::Projector;
 use crate::frame::PixelClass;
-use glam::{Vec3, Vec4};
+use glam::{DVec4, Vec3};
 
-/// Marks the pixels on which a triangle (relative to the view's origin) stands before what landed there.
+/// Marks the pixels on which a triangle (metres, relative to the segment's origin, as samples are) stands before what landed there.
 pub fn turned(triangle: [Vec3; 3], view: &Projector, landings: &Landings, marks: &Marks) {
-    let triangle = triangle.map(|p| *view.raster_from_world() * p.extend(1.0));
-    let (corners, count) = before_the_eye(triangle, view.near());
+    // A floor may begin under the eye and end at the horizon: in single precision its near part would be lost.
+    let raster_from_world = view.raster_from_world().as_dmat4();
+    let triangle = triangle.map(|p| raster_from_world * p.as_dvec3().extend(1.0));
+    let (corners, count) = before_the_eye(triangle, view.near().into(), view.is_perspective());
     let corners = &corners[..count];
-    let Some(nearest) = corners.iter().map(|c| c.z).reduce(f32::min) else { return };
+    let Some(nearest) = corners.iter().map(|c| c.z).reduce(f64::min) else { return };
     let mut outline = [(0.0, 0.0); 4];
     outline.iter_mut().zip(corners).for_each(|(place, c)| *place = (c.x / c.w, c.y / c.w));
-    for_each_centre(&outline[..count], view.size(), |x, y| {
-        if let Some(pixel) = view.pixel(x, y)
-            && landings.z(pixel).is_none_or(|z| z > nearest)
+    let (width, height) = view.size();
+    for_each_centre(&outline[..count], (width.into(), height.into()), |x, y| {
+        if let Some(pixel) = view.pixel(x as f32, y as f32)
+            && landings.z(pixel).is_none_or(|z| f64::from(z) > nearest)
         {
             marks.set(pixel, PixelClass::Bad);
         }
     });
 }
 
-/// What is nearer to the plane of the eye than this share of the farthest corner's depth is cut off with what is before the
-/// near plane: it lies far outside the image, where single precision ends.
-const NEAREST: f32 = 1e-3;
+/// What is nearer to the plane of a perspective eye than this share of the farthest corner's depth is cut off with what is before
+/// the near plane: it lies far outside the image, and division by its depth would leave no digit.
+const NEAREST: f64 = 1e-9;
 
 /// The part of a triangle beyond the near plane, in homogeneous raster coordinates: so many corners.
-fn before_the_eye(triangle: [Vec4; 3], near: f32) -> ([Vec4; 4], usize) {
-    let farthest = triangle.iter().map(|c| c.z).fold(0.0, f32::max);
-    let near = near.max(NEAREST * farthest);
-    let (mut kept, mut count) = ([Vec4::ZERO; 4], 0);
+fn before_the_eye(triangle: [DVec4; 3], near: f64, perspective: bool) -> ([DVec4; 4], usize) {
+    let farthest = triangle.iter().map(|c| c.z).fold(0.0, f64::max);
+    let near = if perspective { near.max(NEAREST * farthest) } else { near };
+    let (mut kept, mut count) = ([DVec4::ZERO; 4], 0);
     let mut keep = |corner| {
         kept[count] = corner;
         count += 1;
@@ -53,7 +56,7 @@ fn before_the_eye(triangle: [Vec4; 3], near: f32) -> ([Vec4; 4], usize) {
 }
 
 /// Visits the centre of every pixel of the window that a convex outline covers.
-fn for_each_centre(outline: &[(f32, f32)], (width, height): (f32, f32), mut visit: impl FnMut(f32, f32)) {
+fn for_each_centre(outline: &[(f64, f64)], (width, height): (f64, f64), mut visit: impl FnMut(f64, f64)) {
     let (top, bottom) = span(outline.iter().map(|p| p.1));
     let mut y = first_centre(top);
     while y <= bottom.min(height) {
@@ -74,12 +77,12 @@ fn for_each_centre(outline: &[(f32, f32)], (width, height): (f32, f32), mut visi
 }
 
 /// The least and the greatest value.
-fn span(values: impl Iterator<Item = f32>) -> (f32, f32) {
-    values.fold((f32::INFINITY, f32::NEG_INFINITY), |(least, greatest), v| (least.min(v), greatest.max(v)))
+fn span(values: impl Iterator<Item = f64>) -> (f64, f64) {
+    values.fold((f64::INFINITY, f64::NEG_INFINITY), |(least, greatest), v| (least.min(v), greatest.max(v)))
 }
 
 /// The first centre of a pixel of the window at `from` or after it.
-fn first_centre(from: f32) -> f32 {
+fn first_centre(from: f64) -> f64 {
     (from - 0.5).ceil().max(0.0) + 0.5
 }
 
@@ -90,8 +93,8 @@ mod tests {
     use std::collections::HashSet;
 
     /// True if a point lies in the triangle.
-    fn holds(t: &[(f32, f32); 3], p: (f32, f32)) -> bool {
-        let side = |a: (f32, f32), b: (f32, f32)| (b.0 - a.0) * (p.1 - a.1) - (b.1 - a.1) * (p.0 - a.0);
+    fn holds(t: &[(f64, f64); 3], p: (f64, f64)) -> bool {
+        let side = |a: (f64, f64), b: (f64, f64)| (b.0 - a.0) * (p.1 - a.1) - (b.1 - a.1) * (p.0 - a.0);
         let sides = [side(t[0], t[1]), side(t[1], t[2]), side(t[2], t[0])];
         sides.iter().all(|&s| s >= 0.0) || sides.iter().all(|&s| s <= 0.0)
     }
@@ -99,7 +102,7 @@ mod tests {
     proptest! {
         /// Every pixel is visited whose centre lies in the triangle, and no other.
         #[test]
-        fn centres_in_a_triangle_are_visited(x in prop::array::uniform3(-5.0..25.0f32), y in prop::array::uniform3(-5.0..15.0f32)) {
+        fn centres_in_a_triangle_are_visited(x in prop::array::uniform3(-5.0..25.0f64), y in prop::array::uniform3(-5.0..15.0f64)) {
             let t = [(x[0], y[0]), (x[1], y[1]), (x[2], y[2])];
             let mut visited = HashSet::new();
             for_each_centre(&t, (20.0, 10.0), |x, y| {
@@ -107,7 +110,7 @@ mod tests {
             });
             for i in 0..200 {
                 let pixel = (i % 20, i / 20);
-                let centre = (pixel.0 as f32 + 0.5, pixel.1 as f32 + 0.5);
+                let centre = (f64::from(pixel.0) + 0.5, f64::from(pixel.1) + 0.5);
                 prop_assert_eq!(visited.contains(&pixel), holds(&t, centre), "{:?}", centre);
             }
         }
@@ -115,14 +118,17 @@ mod tests {
 
     #[test]
     fn what_is_behind_the_eye_is_cut_off() {
-        let corner = |z: f32| Vec4::new(0.0, 0.0, z, z);
-        assert_eq!(before_the_eye([corner(-1.0), corner(-2.0), corner(0.1)], 0.5).1, 0);
-        assert_eq!(before_the_eye([corner(1.0), corner(2.0), corner(3.0)], 0.5).1, 3);
-        let cut = before_the_eye([corner(-1.0), corner(2.0), corner(3.0)], 0.5);
+        let corner = |z: f64| DVec4::new(0.0, 0.0, z, z);
+        assert_eq!(before_the_eye([corner(-1.0), corner(-2.0), corner(0.1)], 0.5, true).1, 0);
+        assert_eq!(before_the_eye([corner(1.0), corner(2.0), corner(3.0)], 0.5, true).1, 3);
+        let cut = before_the_eye([corner(-1.0), corner(2.0), corner(3.0)], 0.5, true);
         assert_eq!(cut.1, 4);
         assert!(cut.0.iter().all(|c| c.z >= 0.5 - 1e-6));
         // Without a near plane too.
-        let cut = before_the_eye([corner(-1.0), corner(2.0), corner(3.0)], 0.0);
-        assert!(cut.0[..cut.1].iter().all(|c| c.z > 1e-3));
+        let cut = before_the_eye([corner(-1.0), corner(2.0), corner(3.0)], 0.0, true);
+        assert!(cut.0[..cut.1].iter().all(|c| c.z > 0.0));
+        // Parallel rays see as much of what is near.
+        let cut = before_the_eye([corner(1e-3), corner(2e6), corner(3e6)], 0.0, false);
+        assert_eq!(cut.1, 3);
     }
 }

@@ -1,6 +1,7 @@
 //! Animation curves as glTF 2.0 defines them (Appendix C).
 
 use glam::DQuat;
+use std::f32::consts::{FRAC_PI_2, PI};
 
 /// How a curve goes from one key to the next.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -67,6 +68,21 @@ pub enum Target {
     LightSize(usize),
     /// Width and height of an area light.
     LightArea(usize),
+}
+
+impl Target {
+    /// The least and the largest value that means anything.
+    pub fn bounds(self) -> (f32, f32) {
+        match self {
+            Self::CameraYfov(_) => (1e-4, PI - 1e-4),
+            Self::CameraXmag(_) | Self::CameraYmag(_) => (1e-9, f32::MAX),
+            Self::CameraNear(_) | Self::LightColor(_) | Self::LightIntensity(_) => (0.0, f32::MAX),
+            Self::LightInnerCone(_) => (0.0, FRAC_PI_2),
+            Self::LightOuterCone(_) => (1e-4, FRAC_PI_2),
+            Self::LightSize(_) | Self::LightArea(_) => (0.0, f32::MAX),
+            _ => (f32::MIN, f32::MAX),
+        }
+    }
 }
 
 /// An animated property.

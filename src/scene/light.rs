@@ -1,7 +1,7 @@
 //! Lights (`KHR_lights_punctual`, and their sizes from `docs/extras.md`) in radiometric units, and the world around the
 //! scene.
 
-use super::{Scene, Target};
+use super::{Material, Scene, Target};
 use glam::{DVec3, Vec2, Vec3};
 
 /// A light and the node that carries it.
@@ -85,6 +85,12 @@ impl PosedLight {
 }
 
 impl Scene {
+    /// True if nothing shines: no light, no world, no material.
+    pub fn is_dark(&self) -> bool {
+        let glows = |m: &Material| m.emissive != Vec3::ZERO || m.unlit;
+        self.lights.is_empty() && self.world.color == Vec3::ZERO && !self.materials.iter().any(glows)
+    }
+
     /// True if light number `light` has a size, now or at some time: its shadows are soft.
     pub fn light_has_size(&self, light: usize) -> bool {
         let Light { kind, size, .. } = self.lights[light];

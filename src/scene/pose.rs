@@ -90,6 +90,9 @@ impl Scene {
         for channel in &self.channels {
             let curve: &Curve = &channel.curve;
             curve.sample_into(time, snap, value);
+            let bounds = channel.target.bounds();
+            // Splines swing beyond their keys.
+            value.iter_mut().for_each(|v| *v = v.clamp(bounds.0.into(), bounds.1.into()));
             let v = value.as_slice();
             match channel.target {
                 Target::Translation(n) => {

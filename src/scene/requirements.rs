@@ -51,7 +51,7 @@ impl Requirements {
         needs.soft_lights = (0..scene.lights.len()).any(|l| scene.light_has_size(l));
         needs.ambient_light = scene.world.color != Vec3::ZERO;
         let moved = scene.moved_nodes();
-        needs.moving_objects = scene.instances.iter().any(|i| moved[i.node] || scene.is_deformed(i));
+        needs.moving_objects = scene.instances.iter().any(|i| moved[i.node] || scene.is_deformed(i, &moved));
         needs.changing_lights = scene.lights.iter().any(|l| moved[l.node]);
         for channel in &scene.channels {
             match channel.target {
@@ -142,14 +142,15 @@ impl Scene {
         moved
     }
 
-    /// True for instances whose vertices move: skinned to animated joints, or with animated morph weights.
-    pub fn is_deformed(&self, instance: &super::Instance) -> bool {
-        let morphed = !self.meshes[instance.mesh].morph_targets.is_empty()
-            && self.channels.iter().any(|c| c.target == Target::Weights(instance.node));
-        let skinned = instance.skin.is_some_and(|s| {
-            let moved = self.moved_nodes();
-            self.skins[s].joints.iter().any(|&j| moved[j])
-        });
-        morphed || skinned
+    /// True for instances whose vertices move: skinned to joints that are `moved` ([`Scene::moved_nodes`]), or morphed.
+    pub fn is_deformed(&self, instance: &super::Instance, moved: &[bool]) -> bool {
+        let skinned = instance.skin.is_some_and(|s| self.skins[s].joints.iter().any(|&j| moved[j]));
+        skinned || self.is_morphed(instance)
+    }
+
+    /// True for instances with animated morph weights.
+    pub fn is_morphed(&self, instance: &super::Instance) -> bool {
+        !self.meshes[instance.mesh].morph_targets.is_empty()
+            && self.channels.iter().any(|c| c.target == Target::Weights(instance.node))
     }
 }

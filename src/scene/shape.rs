@@ -3,7 +3,7 @@
 //! Whatever its name, a shape is a few [`Face`]s, each a bounded part of a quadric (planes are quadrics too): a cylinder is
 //! a curved side and two discs, a capsule a side and two parts of spheres. So one intersection serves them all.
 
-use glam::DVec3;
+use glam::{DVec3, Vec3};
 
 /// Faces that meet at an edge overlap by this share of the shape's size, so that rounding opens no gap between them.
 const OVERLAP: f64 = 1e-12;
@@ -114,6 +114,18 @@ impl Shape {
     /// The box around it in object space, lowest and highest corner; infinite where the shape is.
     pub fn bounds(&self) -> [DVec3; 2] {
         self.bounds
+    }
+
+    /// The two triangles of a plane, counter-clockwise as its front is seen, in object space; none of a solid. A plane without
+    /// end is taken to end a million metres away.
+    pub fn sheet(&self) -> impl Iterator<Item = [Vec3; 3]> + use<> {
+        const ENDLESS: f64 = 1e6;
+        let is_flat = self.bounds[0].y == self.bounds[1].y;
+        let [min, max] =
+            self.bounds.map(|p| p.clamp(DVec3::splat(-ENDLESS), DVec3::splat(ENDLESS)).as_vec3());
+        let [a, b, c, d] = [(min.x, min.z), (min.x, max.z), (max.x, max.z), (max.x, min.z)]
+            .map(|(x, z)| Vec3::new(x, min.y, z));
+        is_flat.then_some([[a, b, c], [a, c, d]]).into_iter().flatten()
     }
 
     /// Whether it is seen from both sides, whatever its material says.

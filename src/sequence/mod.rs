@@ -40,9 +40,15 @@ pub trait FrameSink {
     fn blank(&mut self) -> Option<Frame>;
 
     /// Takes a finished frame. May return before it is written: encoding runs beside the next frame's rendering.
+    ///
+    /// # Errors
+    /// [`Error::Output`] if it, or an earlier one, cannot be written; [`Error::Frame`] if it cannot be encoded.
     fn put(&mut self, frame: Frame) -> Result<()>;
 
     /// Waits until all frames are written. Returns the seconds that each frame's encoding and writing took.
+    ///
+    /// # Errors
+    /// As those of [`FrameSink::put`], for frames that were still under way.
     fn finish(&mut self) -> Result<Vec<(FrameId, StageSeconds)>>;
 }
 
@@ -145,6 +151,9 @@ fn go_on(observer: &dyn Observer) -> Result<()> {
 /// it, then what is after it.
 ///
 /// Frames that are not asked for are still inferred where a wanted one hangs on them, but neither shaded nor written.
+///
+/// # Errors
+/// Those of the sink, and [`Error::Interrupted`] if the observer asks to stop.
 pub fn render_sequence(
     scene: &Scene,
     accel: &mut Accel,

@@ -121,7 +121,7 @@ impl<'a> Carriers<'a> {
         if let Some(skin) = instance.skin {
             return Carrier::Skin(skin);
         }
-        if self.scene.is_deformed(instance) {
+        if self.scene.is_morphed(instance) {
             return Carrier::Weights(instance.node);
         }
         let above = std::iter::successors(Some(instance.node), |&n| self.scene.nodes[n].parent);

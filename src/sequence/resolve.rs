@@ -103,11 +103,9 @@ impl<'a> Resolver<'a> {
         fill(&mut frame.position, size(Aov::Position), |i| {
             self.on_surface(buffer, i, |s| (s.position.as_dvec3() + self.origin).as_vec3())
         });
-        fill(&mut frame.forward, size(Aov::Motion), |i| {
-            self.motion(&buffer.sample(i), self.next.as_ref(), 1.0)
-        });
+        fill(&mut frame.forward, size(Aov::Motion), |i| self.motion(&buffer.sample(i), self.next.as_ref()));
         fill(&mut frame.backward, size(Aov::Motion), |i| {
-            self.motion(&buffer.sample(i), self.previous.as_ref(), -1.0)
+            self.motion(&buffer.sample(i), self.previous.as_ref())
         });
         let lights = if wants(Aov::Lights) { self.scene.lights.len() } else { 0 };
         frame.lights.resize_with(lights, Default::default);
@@ -235,9 +233,8 @@ impl<'a> Resolver<'a> {
         if sample.surface.is_background() { [0.0; 3] } else { value(&sample).to_array() }
     }
 
-    /// Pixels, x right and y up, that the sample moves on the image between this frame and `other`, in the direction
-    /// of time: `sign` is 1 if `other` is later, -1 if it is earlier.
-    fn motion(&self, sample: &SurfaceSample, other: Option<&Neighbour>, sign: f32) -> [f32; 2] {
+    /// Pixels, x right and y up, from where the sample is on the image to where it is in the `other` frame.
+    fn motion(&self, sample: &SurfaceSample, other: Option<&Neighbour>) -> [f32; 2] {
         let Some(other) = other else { return [0.0; 2] };
         let here = sample.position.as_dvec3();
         let (here, there) = if sample.surface.is_background() {
@@ -252,7 +249,7 @@ impl<'a> Resolver<'a> {
             (r.w > 0.0).then(|| (r.x / r.w, r.y / r.w))
         };
         match (raster(&self.shot.view, here), raster(&other.view, there)) {
-            (Some(a), Some(b)) => [sign * (b.0 - a.0) as f32, -sign * (b.1 - a.1) as f32],
+            (Some(a), Some(b)) => [(b.0 - a.0) as f32, (a.1 - b.1) as f32],
             _ => [0.0; 2],
         }
     }

@@ -98,7 +98,7 @@ impl Tracer<'_> {
         mut count: impl FnMut(),
     ) -> f32 {
         let light = &self.lights[number];
-        let samples = if light.has_size() { self.options.light_samples } else { 1 };
+        let samples = if light.has_size() { self.options.light_samples.max(1) } else { 1 };
         let seed = hash(point.seed(), number as u32);
         let share = inquiry.answer(samples, |i, ratio| {
             let u = if samples == 1 { MIDDLE } else { sobol(i, seed) };

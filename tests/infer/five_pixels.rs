@@ -167,8 +167,19 @@ fn a_pure_rotation_contests_nothing() {
 fn the_background_keeps_its_direction() {
     let sky: Vec<_> =
         (0..5).map(|i| SurfaceSample::background(Vec3::new(i as f32 - 2.0, 0.0, -1.0).normalize())).collect();
-    let (new, rays) = infer(&sky, &five(0.0), &five(30.0));
+    let (new, rays) = infer(&sky, &five(0.0), &five(0.0));
     assert_eq!((new.class, rays.primary), (vec![Good; 5], 0));
+    // Turned by less than half a pixel, each direction is still in its pixel.
+    let (new, rays) = infer(&sky, &five(0.0), &view(DVec3::ZERO, 0.05, 5, 1));
+    assert!(!new.class.contains(&Entering) && rays.primary <= 1, "{:?}", new.class);
+}
+
+#[test]
+fn before_a_sky_alone_anything_may_come_in() {
+    let sky: Vec<_> =
+        (0..5).map(|i| SurfaceSample::background(Vec3::new(i as f32 - 2.0, 0.0, -1.0).normalize())).collect();
+    let (new, rays) = infer(&sky, &five(0.0), &five(30.0));
+    assert_eq!((new.class, rays.primary), (vec![Entering; 5], 5));
 }
 
 #[test]

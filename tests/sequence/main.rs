@@ -4,6 +4,7 @@
 
 #[path = "../support/chains.rs"]
 mod chains;
+mod entering;
 mod guarantee;
 mod moves;
 mod paths;
