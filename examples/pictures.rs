@@ -64,7 +64,7 @@ fn read(dir: &str, numbers: &[&str]) -> Result<Vec<ReadFrame>> {
         let wanted: i64 = number.parse()?;
         let has_number = |path: &&PathBuf| {
             let name = path.file_name().unwrap_or_default().to_string_lossy();
-            name.ends_with(".exr") && number_in_name(&name) == Some(wanted)
+            name.ends_with(".exr") && number_in_name(&name).is_some_and(|(_, number, _)| number == wanted)
         };
         let path = files.iter().find(has_number).ok_or(format!("{dir}: there is no frame {wanted}"))?;
         Ok(read_frame(path)?)

@@ -40,11 +40,8 @@ pub enum Error {
         /// What is wrong and what to do.
         message: String,
     },
-    /// The user asked to stop; the finished frames are whole.
-    #[error(
-        "interrupted by {}; finished frames are whole: run again with --skip-existing to go on",
-        if *.signal == 15 { "SIGTERM" } else { "Ctrl-C" }
-    )]
+    /// The user asked to stop.
+    #[error("interrupted by {}", if *.signal == 15 { "SIGTERM" } else { "Ctrl-C" })]
     Interrupted {
         /// 2 for SIGINT, 15 for SIGTERM.
         signal: i32,

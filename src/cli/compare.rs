@@ -4,7 +4,7 @@ use super::args::{CompareArgs, Format};
 use super::say;
 use anyhow::Result;
 use buzz::error::Error;
-use buzz::measure::compare;
+use buzz::measure::{FrameError, compare};
 use std::process::ExitCode;
 
 pub fn run(args: CompareArgs) -> Result<ExitCode> {
@@ -16,6 +16,16 @@ pub fn run(args: CompareArgs) -> Result<ExitCode> {
         Format::Json => serde_json::to_string_pretty(&comparison)? + "\n",
         Format::Text => comparison.to_string(),
     })?;
-    let under = |limit: f64| comparison.frames.iter().any(|f| f.error.psnr_db.is_some_and(|db| db < limit));
-    Ok(ExitCode::from(u8::from(args.fail_below.is_some_and(under))))
+    let Some(limit) = args.fail_below else { return Ok(ExitCode::SUCCESS) };
+    let is_under = |f: &&FrameError| f.error.psnr_db.is_some_and(|db| db < limit);
+    let under = comparison.frames.iter().filter(is_under).count();
+    let missing = comparison.unmatched.reference.len();
+    if under + missing == 0 {
+        return Ok(ExitCode::SUCCESS);
+    }
+    say::complain(format_args!(
+        "{}: {under} frames are under {limit} dB, and {missing} of the reference are not there",
+        args.dir.display()
+    ));
+    Ok(ExitCode::from(1))
 }

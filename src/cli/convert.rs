@@ -1,37 +1,37 @@
 //! `buzz-convert INPUT OUT_DIR`: the main job.
 
 use super::args::{CompressionArg, ConvertArgs};
+use super::existing::{existing, place_of, prepare_report, refuse_input, refuse_report_of_another};
 use super::interrupt::Interrupt;
 use super::job::{Job, stem, warn_of_ignored};
 use super::plan_file::PlanFile;
-use super::progress::{Progress, Tally};
+use super::progress::{Progress, Work};
 use super::say;
+use super::summary::{report, summary};
 use super::{memory, parse};
 use anyhow::{Context, Result};
 use buzz::error::Error;
 use buzz::frame::{Aov, FrameId, FrameKind, FrameStats, StereoEye};
-use buzz::infer::BuzzBuffer;
 use buzz::output::{
-    self, Compression, ExrSink, FileOptions, FrameFile, FrameRecord, NamePattern, OutputFolder, Report,
-    ReportInput, Review, Run, RunSeconds, SceneSummary, SettingsHash, SettingsHasher, Thumbnails,
-    WithThumbnails, earlier_runs, peak_bytes,
+    Compression, ExrSink, FileOptions, FrameRecord, NamePattern, OutputFolder, Review, Run, RunSeconds,
+    SettingsHash, SettingsHasher, Thumbnails, WithThumbnails, earlier_runs, peak_bytes,
 };
 use buzz::plan::{Plan, Segment};
-use buzz::scene::{Projection, Requirements, Scene};
+use buzz::scene::{Projection, Scene};
 use buzz::sequence::{FrameSink, Observer, Settings, render_sequence};
-use buzz::trace::lit_words;
-use rayon::prelude::*;
 use std::collections::BTreeSet;
-use std::path::Path;
 use std::process::ExitCode;
 use std::time::{Instant, SystemTime, UNIX_EPOCH};
+
+/// What to do after an interruption.
+pub const ADVICE: &str = "; finished frames are whole: run again with --skip-existing to go on";
 
 pub fn run(args: ConvertArgs) -> Result<ExitCode> {
     let (started, start) = (SystemTime::now(), Instant::now());
     let (Some(input), Some(out_dir)) = (&args.input, &args.out_dir) else {
         return Err(Error::Usage("INPUT and OUT_DIR are missing".into()).into());
     };
-    let interrupt = Interrupt::watch().context("signals cannot be watched")?;
+    let interrupt = Interrupt::watch(ADVICE).context("signals cannot be watched")?;
     let names =
         NamePattern::parse(args.output.name.as_deref().unwrap_or(NamePattern::DEFAULT), &stem(input))?;
     let asked = args.output.frames.as_deref().map(parse::frames).transpose()?;
@@ -50,18 +50,25 @@ pub fn run(args: ConvertArgs) -> Result<ExitCode> {
     let whole = frames == (timing.first..=timing.last).collect();
     let report_path = args.output.report.clone().unwrap_or_else(|| out_dir.join(report_name(&frames, whole)));
 
+    let mut warnings = Warnings::default();
+
     interrupt.writing();
-    if let Some(path) = &args.output.report {
-        prepare_report(path)?;
+    if args.output.report.is_some() {
+        prepare_report(&report_path)?;
     }
     let pictures = frames.iter().flat_map(|&f| pictures_of(f, &job.settings));
     let folder = OutputFolder::open(out_dir, names, pictures)?;
     if !folder.is_locked() {
         let path = folder.path().display();
-        say::complain(format_args!(
-            "warning: {path}: the file system has no locks: do not run twice on the same frames"
-        ));
+        warnings.add(format!("{path}: the file system has no locks: do not run twice on the same frames"));
     }
+    prepare_report(&report_path)?;
+    let inputs = [Some(input), args.output.plan.as_ref(), args.scene.camera_from.as_ref()];
+    refuse_input(&report_path, inputs.into_iter().flatten().chain(&args.scene.geometry))?;
+    if !args.output.overwrite {
+        refuse_report_of_another(&report_path, input)?;
+    }
+    memory::refuse_planning_over(memory_limit, &job)?;
     let planning = Instant::now();
     let plan = match &replayed {
         Some(file) => job.replay(file, &*interrupt)?,
@@ -70,10 +77,17 @@ pub fn run(args: ConvertArgs) -> Result<ExitCode> {
     let plan_seconds = planning.elapsed().as_secs_f64();
     let hash = settings_hash(&job, &plan, &args);
     let skipped = existing(&folder, &frames, &hash, &job.settings, &args, &interrupt)?;
+    let beyond = frames.iter().filter(|&&f| !(timing.first..=timing.last).contains(&f)).count();
+    if beyond > 0 {
+        warnings.add(format!(
+            "--frames: {beyond} of them are not in the scene's range, {}-{}; curves stand still there",
+            timing.first, timing.last
+        ));
+    }
     let to_render: BTreeSet<i64> =
         frames.difference(&skipped.iter().map(|r| r.id.number).collect()).copied().collect();
-    if let Some(limit) = memory_limit.filter(|_| !to_render.is_empty()) {
-        memory::refuse_over(limit, &job)?;
+    if !to_render.is_empty() {
+        memory::refuse_over(memory_limit, &job)?;
     }
 
     let options = FileOptions {
@@ -85,12 +99,13 @@ pub fn run(args: ConvertArgs) -> Result<ExitCode> {
     let mut sink = ExrSink::new(folder, options)?;
     let pixels = job.settings.window.pixels() as u64;
     let count = to_render.iter().flat_map(|&f| pictures_of(f, &job.settings)).count();
-    let progress = Progress::new(args.output.progress, count, pixels, interrupt);
+    let work = Work { frames: count, on_the_way: plan.on_the_way(&to_render) };
+    let progress = Progress::new(args.output.progress, work, pixels, interrupt);
     let mut thumbnails = Thumbnails::of(&frames);
     for record in skipped.iter().filter(|r| r.id.eye != Some(StereoEye::Right)) {
         thumbnails.read(record.id.number, &sink.folder().file_of(record.id));
     }
-    let mut recorder = Recorder { progress, records: skipped };
+    let mut recorder = Recorder { progress, records: skipped, on_the_way: 0.0 };
     let Job { scene, accel, settings, .. } = &mut job;
     let mut shown = WithThumbnails { sink: &mut sink, thumbnails: &mut thumbnails };
     let rendered = render_sequence(scene, accel, settings, &plan, &to_render, &mut shown, &mut recorder);
@@ -106,8 +121,8 @@ pub fn run(args: ConvertArgs) -> Result<ExitCode> {
     }
     records.sort_by_key(|r| r.id);
     for (frame, values) in sink.repaired() {
-        say::complain(format_args!(
-            "warning: frame {frame}: {values} values were not finite or too large for their channel and were replaced"
+        warnings.add(format!(
+            "frame {frame}: {values} values were not finite or too large for their channel and were replaced"
         ));
     }
 
@@ -117,6 +132,7 @@ pub fn run(args: ConvertArgs) -> Result<ExitCode> {
         import: job.import_seconds,
         accel: job.accel_seconds,
         plan: plan_seconds,
+        on_the_way: recorder.on_the_way,
         wall: start.elapsed().as_secs_f64(),
     };
     runs.push(Run {
@@ -126,7 +142,7 @@ pub fn run(args: ConvertArgs) -> Result<ExitCode> {
         seconds,
         peak_bytes: peak_bytes(),
     });
-    let report = report(input, hash, &job, &plan, records, runs);
+    let report = report(input, hash, &job, &plan, records, (runs, warnings.given));
     report.write_json(&report_path)?;
     report.write_html(&report_path.with_extension("html"), &thumbnails.encoded())?;
     // Of a pair, the left eye is looked at.
@@ -147,28 +163,6 @@ pub fn run(args: ConvertArgs) -> Result<ExitCode> {
     review.write(&report_path, &thumbnails)?;
     say::result(&summary(&report))?;
     Ok(ExitCode::SUCCESS)
-}
-
-/// Finds out before the rendering, not after it, that the report cannot be written.
-pub(super) fn prepare_report(path: &Path) -> Result<()> {
-    if path.extension().is_none_or(|e| e != "json") {
-        let message =
-            format!("--report {}: expected a .json file; a page is written beside it", path.display());
-        return Err(Error::Usage(message).into());
-    }
-    if path.is_dir() {
-        return Err(Error::output(path, "is a folder; name a file in it").into());
-    }
-    let (folder, _) = place_of(path);
-    let made = std::fs::create_dir_all(folder).and_then(|()| tempfile::tempfile_in(folder));
-    made.map_err(|e| Error::output(path, format!("the report cannot be written there ({e})")))?;
-    Ok(())
-}
-
-/// The folder of a file, and its name in it.
-fn place_of(path: &Path) -> (&Path, String) {
-    let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    (folder, path.file_name().unwrap_or_default().to_string_lossy().into_owned())
 }
 
 /// Resolves what depends on the image's size.
@@ -215,8 +209,21 @@ fn refuse_parallel(scene: &Scene, settings: &Settings) -> Result<()> {
     }
 }
 
+/// What was warned of, for the report.
+#[derive(Default)]
+struct Warnings {
+    given: Vec<String>,
+}
+
+impl Warnings {
+    fn add(&mut self, warning: String) {
+        say::complain(format_args!("warning: {warning}"));
+        self.given.push(warning);
+    }
+}
+
 /// Each frame's pictures: one, or the eyes'.
-fn pictures_of(frame: i64, settings: &Settings) -> impl Iterator<Item = FrameId> {
+pub(super) fn pictures_of(frame: i64, settings: &Settings) -> impl Iterator<Item = FrameId> {
     let eyes: &[Option<StereoEye>] = match settings.stereo {
         Some(_) => &[Some(StereoEye::Left), Some(StereoEye::Right)],
         None => &[None],
@@ -245,40 +252,6 @@ fn settings_hash(job: &Job, plan: &Plan, args: &ConvertArgs) -> SettingsHash {
     hasher.finish()
 }
 
-/// Frames that are there already and may stay; an error if some are there and nothing says what to do with them.
-fn existing(
-    folder: &OutputFolder,
-    frames: &BTreeSet<i64>,
-    hash: &SettingsHash,
-    settings: &Settings,
-    args: &ConvertArgs,
-    interrupt: &Interrupt,
-) -> Result<Vec<FrameRecord>> {
-    if args.output.overwrite {
-        return Ok(Vec::new());
-    }
-    if !args.output.skip_existing {
-        let pictures = || frames.iter().flat_map(|&number| pictures_of(number, settings));
-        if let Some(path) = pictures().map(|id| folder.file_of(id)).find(|path| path.exists()) {
-            let message = "is there already; give --skip-existing to keep finished frames, or --overwrite to replace them";
-            return Err(Error::output(path, message).into());
-        }
-        return Ok(Vec::new());
-    }
-    // Each file is read in full: thousands of them take their time.
-    let check = |id: FrameId| match folder.check(id, hash) {
-        FrameFile::Complete(stats, kind) => Some(FrameRecord { id, kind, stats, skipped: true }),
-        FrameFile::Missing | FrameFile::Stale(_) => None,
-    };
-    // A pair is there if both of it are.
-    let check_all = |&number: &i64| match interrupt.stop_requested() {
-        Some(signal) => Err(Error::Interrupted { signal }),
-        None => Ok(pictures_of(number, settings).map(check).collect::<Option<Vec<_>>>()),
-    };
-    let found = frames.par_iter().map(check_all).collect::<buzz::Result<Vec<_>>>()?;
-    Ok(found.into_iter().flatten().flatten().collect())
-}
-
 fn compression(compression: CompressionArg) -> Compression {
     match compression {
         CompressionArg::None => Compression::None,
@@ -301,12 +274,16 @@ fn report_name(frames: &BTreeSet<i64>, whole: bool) -> String {
 struct Recorder {
     progress: Progress,
     records: Vec<FrameRecord>,
+    /// Seconds that frames took that are not wanted, but lie on the way to those that are.
+    on_the_way: f64,
 }
 
 impl Observer for Recorder {
     fn frame_done(&mut self, id: FrameId, kind: FrameKind, stats: &FrameStats, wanted: bool) {
         if wanted {
             self.records.push(FrameRecord { id, kind, stats: *stats, skipped: false });
+        } else {
+            self.on_the_way += stats.seconds.infer + stats.seconds.trace;
         }
         self.progress.frame_done(id, kind, stats, wanted);
     }
@@ -314,75 +291,4 @@ impl Observer for Recorder {
     fn stop_requested(&self) -> Option<i32> {
         self.progress.stop_requested()
     }
-}
-
-fn report(
-    input: &Path,
-    settings_hash: SettingsHash,
-    job: &Job,
-    plan: &Plan,
-    frames: Vec<FrameRecord>,
-    runs: Vec<Run>,
-) -> Report {
-    let scene = &job.scene;
-    Report::new(ReportInput {
-        input: input.display().to_string(),
-        settings_hash,
-        settings: output::Settings {
-            quality: job.settings.quality.name().into(),
-            width: job.settings.width,
-            height: job.settings.height,
-            fps: output::Settings::fps(scene.timing.fps),
-            threads: job.threads,
-            aa: job.settings.aa,
-        },
-        scene: SceneSummary {
-            triangles: scene.triangle_count(),
-            shapes: scene.shape_count(),
-            instances: scene.instances.len(),
-            lights: scene.lights.len(),
-            requires: Requirements::of(scene).names().iter().map(|&n| n.into()).collect(),
-            ignored: scene.ignored.iter().map(Into::into).collect(),
-            bytes_per_pixel: BuzzBuffer::bytes_per_pixel(lit_words(scene, job.settings.trace_options())),
-        },
-        plan: plan.into(),
-        frames,
-        predicted: plan.frames.iter().map(|f| (f.frame, f.predicted_traced)).collect(),
-        runs,
-        warnings: Vec::new(),
-    })
-}
-
-/// Three lines: frames, rays saved, where the time went.
-fn summary(report: &Report) -> String {
-    let totals = &report.totals;
-    let frames = if totals.frames == 1 { "frame" } else { "frames" };
-    let mut tally = Tally::default();
-    for frame in &report.frames {
-        tally.add(frame.from.map_or(FrameKind::Traced, |from| FrameKind::Inferred { from }), frame.rays);
-    }
-    let saved = tally.saved().map(|s| format!("{:.1} % of camera and shadow rays saved", 100.0 * s));
-    let hidden = totals.hidden.map(|h| format!("; {h} reused samples hidden")).unwrap_or_default();
-    let runs = match report.runs.len() {
-        0 | 1 => String::new(),
-        n => format!(" of {n} runs added up"),
-    };
-    let s = &totals.seconds;
-    format!(
-        "{} {frames}: {} traced, {} inferred, in {:.1} s{runs}\n{}{hidden}\n\
-         seconds: {:.1} reading, {:.1} trees, {:.1} plan, {:.1} infer, {:.1} trace, {:.1} enhance, \
-         {:.1} write (beside)\n",
-        totals.frames,
-        totals.traced_frames,
-        totals.inferred_frames,
-        s.wall,
-        saved.unwrap_or_else(|| "no key frame among these frames to measure the saving against".into()),
-        s.import,
-        s.accel,
-        s.plan,
-        s.infer,
-        s.trace,
-        s.enhance,
-        s.write
-    )
 }

@@ -78,6 +78,9 @@ fn as_text(scene: &Scene) -> String {
         let size = if size.is_empty() { String::new() } else { format!(" {}", size.join(" x ")) };
         text += &format!("light: {} ({}{size})\n", light.name, light_kind(light));
     }
+    if scene.is_dark() {
+        text += "nothing in it shines: all is black\n";
+    }
     let names = needs.names();
     let names = if names.is_empty() { "nothing special".into() } else { names.join(", ") };
     text += &format!("requires: {names}\nstages: {}\n", needs.stages().join(", "));

@@ -4,6 +4,7 @@
 use super::say;
 use buzz::error::Error;
 use buzz::frame::{FrameId, FrameKind, FrameStats};
+use buzz::output::remove_temporary_files;
 use buzz::sequence::Observer;
 use signal_hook::consts::{SIGINT, SIGTERM};
 use signal_hook::iterator::Signals;
@@ -20,8 +21,9 @@ pub struct Interrupt {
 }
 
 impl Interrupt {
-    /// Watches for signals from now on. Until [`Interrupt::writing`], the first ends the program too.
-    pub fn watch() -> std::io::Result<Arc<Self>> {
+    /// Watches for signals from now on. Until [`Interrupt::writing`], the first ends the program too. `advice` tells the user how
+    /// to go on.
+    pub fn watch(advice: &'static str) -> std::io::Result<Arc<Self>> {
         let mut signals = Signals::new([SIGINT, SIGTERM])?;
         let interrupt = Arc::new(Self::default());
         let shared = Arc::clone(&interrupt);
@@ -29,7 +31,8 @@ impl Interrupt {
             for signal in signals.forever() {
                 let first = shared.signal.swap(signal, SeqCst) == 0;
                 if !(first && shared.writing.load(SeqCst)) {
-                    say::complain(Error::Interrupted { signal });
+                    remove_temporary_files();
+                    say::complain(format_args!("{}{advice}", Error::Interrupted { signal }));
                     std::process::exit(128 + signal);
                 }
             }

@@ -114,11 +114,16 @@ pub fn read(input: &Path, args: &SceneArgs) -> Result<Scene> {
     Ok(import(input, &options)?)
 }
 
-/// Says once what of the scene is not rendered.
+/// Says once what of the scene is not rendered, and if nothing in it shines.
 pub fn warn_of_ignored(scene: &Scene) {
+    if scene.is_dark() {
+        say::complain(
+            "warning: nothing in the scene shines, so all is black: add a light, an emissive material, or a world in extras.buzz",
+        );
+    }
     for ignored in &scene.ignored {
         let Ignored { place, feature, effect } = ignored;
-        say::complain(format_args!("warning: {place}: {feature} is not rendered: {effect}"));
+        say::complain(format_args!("warning: {place}: {feature}: {effect}"));
     }
 }
 

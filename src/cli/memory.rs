@@ -1,33 +1,67 @@
-//! `--memory`: what rendering will take, found out before it begins.
+//! What rendering will take in memory, found out before it begins.
 
 use super::job::Job;
 use anyhow::Result;
 use buzz::error::Error;
 use buzz::infer::Inference;
-use buzz::output::{ExrSink, peak_bytes};
+use buzz::output::{ExrSink, most_bytes, peak_bytes};
+use buzz::plan::{PathFrame, ProbePoint};
 use buzz::scene::{Requirements, Scene};
 use buzz::sequence::{Quality, Settings, render_bytes_per_pixel};
 use buzz::trace::lit_words;
 
+/// What the planner holds for each frame that another could be inferred from.
+const BYTES_PER_STEP: u64 = 16;
+
+/// Planning that takes less is left to the estimate of rendering, which is more.
+const WORTH_A_WORD: u64 = 256 << 20;
+
 /// Stacks, and what each thread encodes at a time.
 const BYTES_PER_THREAD: u64 = 2 << 20;
 
-/// An error if rendering is estimated to take more than `limit` bytes. To be asked once the scene is read and planned.
-pub fn refuse_over(limit: u64, job: &Job) -> Result<()> {
+/// An error if rendering is estimated to take more than `allowed` bytes, or where nothing is said more than the machine has.
+/// To be asked once the scene is read and planned.
+pub fn refuse_over(allowed: Option<u64>, job: &Job) -> Result<()> {
     let held = peak_bytes();
-    if held == 0 {
+    if allowed.is_some() && held == 0 {
         let message = "--memory: this system does not say how much memory a process holds; leave it out";
         return Err(Error::Usage(message.into()).into());
     }
+    let Some(limit) = allowed.or_else(most_bytes) else { return Ok(()) };
     let estimate = held + rendering(job);
     if estimate <= limit {
         return Ok(());
     }
     let mebibytes = |bytes: u64| bytes.div_ceil(1 << 20);
+    let (whose, more) = match allowed {
+        Some(_) => ("allowed", "allow more, or"),
+        None => ("that there are", "give --memory to try all the same, or"),
+    };
     let message = format!(
-        "--memory: rendering is estimated to take {} MiB ({} MiB of them for the scene), over the {} MiB allowed; allow more, or lower --resolution, --aa, --aov or --threads",
+        "--memory: rendering is estimated to take {} MiB ({} MiB of them for the scene), over the {} MiB {whose}; {more} lower --resolution, --aa, --aov or --threads",
         mebibytes(estimate),
         mebibytes(held),
+        limit >> 20
+    );
+    Err(Error::Usage(message).into())
+}
+
+/// An error if planning the whole range is estimated to take more than is `allowed`, or than the machine has.
+pub fn refuse_planning_over(allowed: Option<u64>, job: &Job) -> Result<()> {
+    let Some(limit) = allowed.or_else(most_bytes) else { return Ok(()) };
+    let timing = &job.scene.timing;
+    let frames = (timing.last - timing.first + 1) as u64;
+    let (columns, rows) = PathFrame::PROBE;
+    let probe = columns as u64 * rows as u64 * size_of::<ProbePoint>() as u64;
+    let chain = u64::from(job.longest_segment).min(frames) * BYTES_PER_STEP;
+    let planning = frames * (probe + chain);
+    let estimate = peak_bytes() + planning;
+    if planning < WORTH_A_WORD || estimate <= limit {
+        return Ok(());
+    }
+    let message = format!(
+        "--memory: to plan {frames} frames is estimated to take {} MiB, over {} MiB; render the shot in parts (extras.buzz frame_start and frame_end), or give a lower --fps or --segment",
+        estimate.div_ceil(1 << 20),
         limit >> 20
     );
     Err(Error::Usage(message).into())

@@ -3,6 +3,7 @@
 mod args;
 mod compare;
 mod convert;
+mod existing;
 mod inspect;
 mod interrupt;
 mod job;
@@ -13,15 +14,21 @@ mod plan;
 mod plan_file;
 mod progress;
 mod say;
+mod summary;
 mod trade;
 
 use anyhow::Result;
 use args::{Cli, Command};
 use clap::Parser;
 use std::process::ExitCode;
+#[cfg(unix)]
+use std::sync::Arc;
 
 /// Runs the program and returns its exit code.
 pub fn run() -> ExitCode {
+    // Over a limit on file sizes (`ulimit -f`) the system would end the program; caught, the write fails and is explained.
+    #[cfg(unix)]
+    let _ = signal_hook::flag::register(signal_hook::consts::SIGXFSZ, Arc::default());
     let cli = match Cli::try_parse() {
         Ok(cli) => cli,
         Err(error) => {
@@ -34,12 +41,19 @@ pub fn run() -> ExitCode {
             return ExitCode::SUCCESS;
         }
     };
+    let advice = match cli.command {
+        None => convert::ADVICE,
+        Some(Command::Trade(_)) => trade::ADVICE,
+        Some(_) => "",
+    };
     match dispatch(cli) {
         Ok(code) => code,
         Err(error) => {
-            say::complain(format_args!("{error:#}"));
-            let code = error.downcast_ref::<buzz::Error>().map_or(1, buzz::Error::exit_code);
-            ExitCode::from(code)
+            let known = error.downcast_ref::<buzz::Error>();
+            let advice =
+                known.filter(|e| matches!(e, buzz::Error::Interrupted { .. })).map_or("", |_| advice);
+            say::complain(format_args!("{error:#}{advice}"));
+            ExitCode::from(known.map_or(1, buzz::Error::exit_code))
         }
     }
 }
@@ -58,7 +72,10 @@ fn dispatch(cli: Cli) -> Result<ExitCode> {
 fn one_line(text: &str) -> String {
     let lines =
         text.lines().map(str::trim).take_while(|l| !l.starts_with("Usage:") && !l.starts_with("For more"));
-    let said = lines.filter(|l| !l.is_empty()).collect::<Vec<_>>().join(" ");
+    // What is not an option here is hardly ever meant as a value.
+    let is_idle = |l: &str| l.is_empty() || l.starts_with("tip:") && l.contains("as a value");
+    let useful = lines.filter(|l| !is_idle(l));
+    let said = useful.collect::<Vec<_>>().join(" ").replace(" tip: ", "; tip: ");
     format!("{}; --help lists all options", said.strip_prefix("error: ").unwrap_or(&said))
 }
 

@@ -3,7 +3,7 @@
 use super::args::{PlanArgs, PlanFormat};
 use super::job::{Job, warn_of_ignored};
 use super::plan_file::PlanFile;
-use super::{openjd, say};
+use super::{memory, openjd, say};
 use anyhow::Result;
 use buzz::error::Error;
 use buzz::frame::FrameKind;
@@ -21,6 +21,7 @@ pub fn run(args: PlanArgs) -> Result<ExitCode> {
     }
     let mut job = Job::new(&args.input, &args.scene, &args.image.render, args.image.quality)?;
     warn_of_ignored(&job.scene);
+    memory::refuse_planning_over(None, &job)?;
     let plan = job.plan(args.workers as usize, &Unwatched)?;
     say::result(&match args.format {
         PlanFormat::Json => serde_json::to_string_pretty(&as_json(&job, &plan)?)? + "\n",

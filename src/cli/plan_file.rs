@@ -32,7 +32,12 @@ impl PlanFile {
 
     /// Reads a plan.
     pub fn read(path: &Path) -> Result<Self> {
-        let text = std::fs::read(path).map_err(|e| Error::input(path, "the file", e.to_string()))?;
+        let fail = |why: String| Error::input(path, "the file", why);
+        // To open a pipe would wait for whoever writes to it, and a device has no end.
+        if !std::fs::metadata(path).map_err(|e| fail(e.to_string()))?.is_file() {
+            return Err(fail("is no file; give it what plan --format json prints".into()).into());
+        }
+        let text = std::fs::read(path).map_err(|e| fail(e.to_string()))?;
         let broken = |e: serde_json::Error| {
             let place = format!("line {} column {}", e.line(), e.column());
             Error::input(path, place, format!("{e}; expected what plan --format json prints"))

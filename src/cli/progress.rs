@@ -13,12 +13,23 @@ use std::time::{Duration, Instant};
 /// Counts frames and rays, prints them, and passes on a request to stop.
 pub struct Progress {
     style: Style,
-    total: usize,
+    work: Work,
     done: usize,
+    /// Frames made that were not asked for.
+    passed: usize,
     pixels: u64,
     tally: Tally,
     start: Instant,
     interrupt: Arc<Interrupt>,
+}
+
+/// What there is to do.
+#[derive(Debug, Clone, Copy)]
+pub struct Work {
+    /// Pictures that are asked for.
+    pub frames: usize,
+    /// Frames that have to be made before.
+    pub on_the_way: usize,
 }
 
 enum Style {
@@ -56,8 +67,9 @@ impl Tally {
 }
 
 impl Progress {
-    /// Progress of `total` frames of `pixels` pixels; `interrupt` knows whether to stop.
-    pub fn new(style: ProgressArg, total: usize, pixels: u64, interrupt: Arc<Interrupt>) -> Self {
+    /// Progress of `work` on frames of `pixels` pixels; `interrupt` knows whether to stop.
+    pub fn new(style: ProgressArg, work: Work, pixels: u64, interrupt: Arc<Interrupt>) -> Self {
+        let total = work.frames + work.on_the_way;
         let style = match style {
             ProgressArg::Auto if std::io::stderr().is_terminal() => Style::Bar(bar(total)),
             ProgressArg::Bar => Style::Bar(bar(total)),
@@ -65,7 +77,8 @@ impl Progress {
             ProgressArg::Openjd => Style::Openjd,
             ProgressArg::None => Style::None,
         };
-        Self { style, total, done: 0, pixels, tally: Tally::default(), start: Instant::now(), interrupt }
+        let (tally, start) = (Tally::default(), Instant::now());
+        Self { style, work, done: 0, passed: 0, pixels, tally, start, interrupt }
     }
 
     /// Leaves the terminal as it was.
@@ -76,8 +89,28 @@ impl Progress {
     }
 
     fn left(&self) -> Duration {
-        let each = self.start.elapsed().as_secs_f64() / self.done.max(1) as f64;
-        Duration::from_secs_f64(each * self.total.saturating_sub(self.done) as f64)
+        let (made, all) = (self.done + self.passed, self.work.frames + self.work.on_the_way);
+        let each = self.start.elapsed().as_secs_f64() / made.max(1) as f64;
+        Duration::from_secs_f64(each * all.saturating_sub(made) as f64)
+    }
+
+    /// Says that a frame was made which was not asked for.
+    fn pass(&self, frame: FrameId) {
+        let what = format!("on the way, {} of {}", self.passed, self.work.on_the_way);
+        match &self.style {
+            Style::Bar(bar) => {
+                bar.set_message(format!("frame {frame} {what}"));
+                bar.inc(1);
+            }
+            Style::Plain => {
+                say::line(format_args!("frame {frame}: {what}, {} left", HumanDuration(self.left())))
+            }
+            Style::Openjd => {
+                // A reader that cannot be reached is no error of the frame's.
+                let _ = say::result(&format!("openjd_status: {what}: frame {frame}\n"));
+            }
+            Style::None => {}
+        }
     }
 
     fn say(&self, frame: FrameId, kind: FrameKind, stats: &FrameStats) {
@@ -97,11 +130,11 @@ impl Progress {
             Style::Plain => say::line(format_args!(
                 "frame {frame}: {how}, {share:.1} % of pixels traced; {}/{}{saved}, {} left",
                 self.done,
-                self.total,
+                self.work.frames,
                 HumanDuration(self.left())
             )),
             Style::Openjd => {
-                let percent = 100.0 * self.done as f64 / self.total.max(1) as f64;
+                let percent = 100.0 * self.done as f64 / self.work.frames.max(1) as f64;
                 let lines =
                     format!("openjd_progress: {percent:.1}\nopenjd_status: frame {frame} {how}{saved}\n");
                 // A reader that cannot be reached is no error of the frame's.
@@ -123,7 +156,8 @@ fn bar(total: usize) -> ProgressBar {
 impl Observer for Progress {
     fn frame_done(&mut self, frame: FrameId, kind: FrameKind, stats: &FrameStats, wanted: bool) {
         if !wanted {
-            return;
+            self.passed += 1;
+            return self.pass(frame);
         }
         self.done += 1;
         self.tally.add(kind, stats.rays);

@@ -1,10 +1,10 @@
 //! `buzz-convert trade`: what each quality costs and what it gets wrong.
 
 use super::args::{ProgressArg, QualityArg, TradeArgs};
-use super::convert::prepare_report;
+use super::existing::prepare_report;
 use super::interrupt::Interrupt;
 use super::job::{Job, warn_of_ignored};
-use super::{parse, say};
+use super::{memory, parse, say};
 use anyhow::{Context, Result};
 use buzz::error::Error;
 use buzz::measure::trade::{Candidate, Trade, Watch, sample, trade};
@@ -15,12 +15,17 @@ use std::path::Path;
 use std::process::ExitCode;
 use std::sync::Arc;
 
+/// What to do after an interruption.
+pub const ADVICE: &str =
+    "; nothing was written: run it again, with fewer --frames or a lower --resolution if it takes too long";
+
 pub fn run(args: TradeArgs) -> Result<ExitCode> {
-    let interrupt = Interrupt::watch().context("signals cannot be watched")?;
+    let interrupt = Interrupt::watch(ADVICE).context("signals cannot be watched")?;
     let wanted = args.frames.as_deref().map(parse::frames).transpose()?;
     let mut job = Job::new(&args.input, &args.scene, &args.render, QualityArg::Full)?;
     warn_of_ignored(&job.scene);
     prepare_report(&args.out_dir.join("trade.json"))?;
+    memory::refuse_planning_over(None, &job)?;
     let mut candidates = Vec::new();
     for &quality in QualityArg::value_variants() {
         job.choose_quality(quality);
@@ -36,6 +41,7 @@ pub fn run(args: TradeArgs) -> Result<ExitCode> {
         let frames = args.frames.unwrap_or_default();
         return Err(Error::Usage(format!("--frames {frames}: the scene has frames {first}-{last}")).into());
     }
+    interrupt.writing();
     let mut watch = Shown { style: args.progress, interrupt };
     let input = args.input.display().to_string();
     let Job { scene, accel, .. } = &mut job;

@@ -15,12 +15,13 @@ const PER_BYTE: usize = 256;
 /// Counts what one file takes.
 pub(super) struct Budget {
     left: Cell<usize>,
+    taken: Cell<usize>,
 }
 
 impl Budget {
     /// A budget for a file and its buffers of `bytes` in all.
     pub fn new(bytes: usize) -> Self {
-        Self { left: Cell::new(FLOOR.saturating_add(bytes.saturating_mul(PER_BYTE))) }
+        Self { left: Cell::new(FLOOR.saturating_add(bytes.saturating_mul(PER_BYTE))), taken: Cell::default() }
     }
 
     /// Takes `count` things of `size` bytes, or makes an error of `refuse`.
@@ -29,10 +30,12 @@ impl Budget {
         match self.left.get().checked_sub(wanted) {
             Some(left) => {
                 self.left.set(left);
+                self.taken.set(self.taken.get() + wanted);
                 Ok(())
             }
             None => Err(refuse(format!(
-                "needs {wanted} bytes, more than a file of this size can justify; check its counts, or export it again"
+                "needs {wanted} bytes beside {} that were taken before, more than a file of this size can justify; check its counts, or export it again",
+                self.taken.get()
             ))),
         }
     }

@@ -131,9 +131,6 @@ pub(super) fn refuse_if_strict(file: &Path, ignored: &[Ignored]) -> Result<()> {
         1 => String::new(),
         n => format!(" (and {} more; see `buzz-convert inspect`)", n - 1),
     };
-    let message = format!(
-        "{} is not rendered ({}){more}; remove it or leave out --strict",
-        first.feature, first.effect
-    );
+    let message = format!("{}: {}{more}; mend it, or leave out --strict", first.feature, first.effect);
     Err(Error::input(file, first.place.clone(), message))
 }

@@ -10,7 +10,8 @@ use crate::{
     Result,
     scene::{ColorSpace, Image},
 };
-use image::{DynamicImage, ImageReader, Limits};
+use exr::meta::MetaData;
+use image::{DynamicImage, ImageFormat, ImageReader, Limits};
 use rayon::prelude::*;
 use std::{collections::HashMap, io::Cursor, path::PathBuf};
 
@@ -208,7 +209,20 @@ fn encoded_bytes(
 /// Checks an image's size by its header, and takes it from the pixels that are left.
 fn check_size(data: &[u8], pixels: &mut usize) -> Result<(), String> {
     let reader = ImageReader::new(Cursor::new(data)).with_guessed_format().map_err(|e| e.to_string())?;
-    let (width, height) = reader.into_dimensions().map_err(|e| first_line(&e.to_string()))?;
+    let format = reader.format();
+    let (mut width, mut height) = reader.into_dimensions().map_err(|e| first_line(&e.to_string()))?;
+    if format == Some(ImageFormat::OpenExr) {
+        // What is stored is the data window, which may be larger than the picture.
+        let meta =
+            MetaData::read_from_buffered(Cursor::new(data), false).map_err(|e| first_line(&e.to_string()))?;
+        for size in meta.headers.iter().map(|header| header.layer_size) {
+            let side = |side: usize| u32::try_from(side).unwrap_or(u32::MAX);
+            (width, height) = (width.max(side(size.width())), height.max(side(size.height())));
+        }
+    }
+    if format == Some(ImageFormat::Jpeg) && is_cut_off(data) {
+        return Err("it is cut off".into());
+    }
     if width == 0 || height == 0 || width > MAX_SIDE || height > MAX_SIDE {
         return Err(format!("{width}x{height} pixels; sides from 1 to {MAX_SIDE} are read"));
     }
@@ -217,6 +231,15 @@ fn check_size(data: &[u8], pixels: &mut usize) -> Result<(), String> {
         .checked_sub(count)
         .ok_or_else(|| format!("{width}x{height} pixels are more than its size justifies"))?;
     Ok(())
+}
+
+/// True if a JPEG's last scan has no end (ITU-T T.81, B.1.1.3): what decoders take is grey from there.
+fn is_cut_off(jpeg: &[u8]) -> bool {
+    const START_OF_SCAN: [u8; 2] = [0xff, 0xda];
+    const END_OF_IMAGE: [u8; 2] = [0xff, 0xd9];
+    // Coded data has no 0xff but before a marker, or with a 0 after it.
+    let last = |marker: [u8; 2]| jpeg.windows(2).rposition(|two| two == marker);
+    last(START_OF_SCAN).is_some_and(|start| last(END_OF_IMAGE).is_none_or(|end| end < start))
 }
 
 fn decode(data: &[u8]) -> Result<DynamicImage, String> {

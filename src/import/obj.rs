@@ -121,6 +121,10 @@ fn check_faces(file: &Path, bytes: &[u8]) -> Result<()> {
             _ => {}
         }
     }
+    if counts[0] == 0 {
+        let message = "there is no vertex in it (`v` lines); is it an OBJ file?";
+        return Err(Error::input(file, "OBJ", message));
+    }
     Ok(())
 }
 
@@ -264,8 +268,8 @@ fn load(name: &str, space: ColorSpace, file: &Path, folder: &Path, scene: &mut S
     let path =
         if name.starts_with('-') { name.rsplit(char::is_whitespace).next().unwrap_or(name) } else { name };
     let data = match uri::in_folder(folder, path) {
-        Ok(Source::File(path)) => read_file(&path).map_err(|_| "cannot be read".to_owned()),
-        Ok(_) => Err("is missing".to_owned()),
+        Ok(Source::File(path)) => read_file(&path).map_err(|_| "it cannot be read".to_owned()),
+        Ok(_) => Err("it is missing".to_owned()),
         Err(why) => Err(why),
     };
     match data.and_then(|data| image::load_file(path, &data, space)) {

@@ -1,11 +1,14 @@
-//! A camera that orbits the scene, for files without one.
+//! A camera that orbits the scene, for files without one, and light for those in which nothing shines.
 
 use crate::{
     Error, Result,
-    scene::{Camera, Channel, Curve, Instance, Interpolation, Lens, Node, Pose, Projection, Scene, Target},
+    scene::{
+        Camera, Channel, Curve, Instance, Interpolation, Lens, Light, LightKind, LocalTransform, Node, Pose,
+        Projection, Scene, Target,
+    },
 };
-use glam::{DMat3, DQuat, DVec2, DVec3};
-use std::f64::consts::TAU;
+use glam::{DMat3, DQuat, DVec2, DVec3, Vec3};
+use std::f64::consts::{FRAC_PI_4, TAU};
 
 /// Vertical field of view, radians: 40 degrees, about a 50 mm lens.
 const YFOV: f64 = 0.7;
@@ -13,6 +16,10 @@ const YFOV: f64 = 0.7;
 const ELEVATION: f64 = 0.35;
 /// Room around the scene's bounding sphere.
 const MARGIN: f64 = 1.05;
+/// Where nothing shines, a sun does: the irradiance of what faces it, W/m2, so that white is about 1 with the sky's share.
+const SUN: f32 = 2.5;
+/// And a grey sky: its radiance.
+const SKY: f32 = 0.2;
 /// Frames that an orbit may have.
 const LONGEST: u32 = 100_000;
 
@@ -20,6 +27,8 @@ const LONGEST: u32 = 100_000;
 ///
 /// It stands on the first frame where the scene's own range begins, looks at the middle of the scene's bounds at
 /// that frame, and does not repeat the first position at the end, so that the sequence loops.
+///
+/// A scene in which nothing shines gets a sun that stands still, from above the first frame's left shoulder, and a grey sky.
 pub(super) fn apply(scene: &mut Scene, frames: u32) -> Result<()> {
     if frames == 0 || frames > LONGEST {
         return Err(Error::Usage(format!("--turntable takes from 1 to {LONGEST} frames, not {frames}")));
@@ -65,7 +74,20 @@ pub(super) fn apply(scene: &mut Scene, frames: u32) -> Result<()> {
     };
     scene.cameras = vec![Camera { name: "turntable".into(), node, lens }];
     scene.cuts.clear();
+    if scene.is_dark() {
+        light_up(scene);
+    }
     Ok(())
+}
+
+fn light_up(scene: &mut Scene) {
+    let rotation = DQuat::from_rotation_y(-FRAC_PI_4) * DQuat::from_rotation_x(-FRAC_PI_4);
+    let transform = LocalTransform::Trs { translation: DVec3::ZERO, rotation, scale: DVec3::ONE };
+    let (name, node) = (String::from("turntable sun"), scene.nodes.len());
+    scene.nodes.push(Node { name: name.clone(), transform, ..Node::default() });
+    let kind = LightKind::Directional;
+    scene.lights.push(Light { name, node, kind, color: Vec3::ONE, intensity: SUN, size: 0.0, range: None });
+    scene.world.color = Vec3::splat(SKY);
 }
 
 fn aims_at_camera(target: Target) -> bool {

@@ -75,12 +75,18 @@ pub const ENHANCED: f32 = 4.0;
 /// written there: the frame, its reference, and the absolute difference times [`ENHANCED`], side by side.
 ///
 /// # Errors
-/// [`Error::Input`] if a folder or file cannot be read, if no frame has a counterpart, or if a pair differs in size;
+/// [`Error::Input`] if a folder or file cannot be read, if no frame has a counterpart, or if a pair's data windows differ;
 /// [`Error::Output`] if a picture cannot be written.
 pub fn compare(sequence: &Path, reference: &Path, pictures: Option<&Path>) -> Result<Comparison> {
-    let (pairs, unmatched) = pair_up(list(sequence)?, list(reference)?);
+    let (own, others) = (list(sequence)?, list(reference)?);
+    let names = [&own, &others].map(|of| of.keys().take(4).cloned().collect::<Vec<_>>().join(", "));
+    let (pairs, unmatched) = pair_up(own, others);
     if pairs.is_empty() {
-        let message = format!("no EXR file in it has the frame number of one in {}", reference.display());
+        let [own, others] = names.map(|names| if names.is_empty() { "no EXR frames".into() } else { names });
+        let message = format!(
+            "it holds {own}, and {} holds {others}: no frame of one has the name and number of one of the other",
+            reference.display()
+        );
         return Err(Error::input(sequence, "folder", message));
     }
     let percentile = pairs
@@ -129,8 +135,9 @@ impl Pair {
     fn compare(&self, exposure: Exposure, pictures: Option<&Path>) -> Result<(FrameError, bool)> {
         let a: ReadFrame = read_frame(&self.sequence)?;
         let b = read_frame(&self.reference)?;
-        if (a.width, a.height) != (b.width, b.height) {
-            let size = |f: &ReadFrame| format!("{}x{}", f.width, f.height);
+        let window = |f: &ReadFrame| (f.origin, f.width, f.height);
+        if window(&a) != window(&b) {
+            let size = |f: &ReadFrame| format!("{}x{} from {},{}", f.width, f.height, f.origin.0, f.origin.1);
             let message = format!("it is {}, but {} is {}", size(&a), self.reference.display(), size(&b));
             return Err(Error::input(&self.sequence, "dataWindow", message));
         }
@@ -185,23 +192,21 @@ fn file_name(path: impl AsRef<Path>) -> String {
     path.as_ref().file_name().unwrap_or_default().to_string_lossy().into_owned()
 }
 
-/// By the name without its number, then by number.
+/// By the name with # for its number, then by number.
 type Sequences = BTreeMap<String, BTreeMap<i64, PathBuf>>;
 
-/// The EXR files of a folder; hidden ones (such as a run's temporary files) and those without a number are left out.
+/// The EXR files of a folder; what is hidden (such as a run's temporary files), has no number or is no file is left out.
 fn list(folder: &Path) -> Result<Sequences> {
     let fail = |e: std::io::Error| Error::input(folder, "folder", e.to_string());
     let mut sequences = Sequences::new();
     for entry in std::fs::read_dir(folder).map_err(fail)? {
         let path = entry.map_err(fail)?.path();
         let Some(name) = path.file_name().and_then(|n| n.to_str()) else { continue };
-        if name.starts_with('.') || !name.to_ascii_lowercase().ends_with(".exr") {
+        if !path.is_file() || name.starts_with('.') || !name.to_ascii_lowercase().ends_with(".exr") {
             continue;
         }
-        if let Some(number) = number_in_name(name) {
-            let rest: String = name.chars().filter(|c| !c.is_ascii_digit()).collect();
-            let rest = if number < 0 { rest.replacen('-', "", 1) } else { rest };
-            sequences.entry(rest).or_default().insert(number, path);
+        if let Some((before, number, after)) = number_in_name(name) {
+            sequences.entry(format!("{before}#{after}")).or_default().insert(number, path);
         }
     }
     Ok(sequences)

@@ -10,6 +10,8 @@ use std::path::Path;
 /// What comparisons and pictures need of a frame's file.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ReadFrame {
+    /// The data window's first column and row.
+    pub origin: (i32, i32),
     /// Columns of the data window.
     pub width: usize,
     /// Rows of the data window.
@@ -45,7 +47,9 @@ pub fn read_frame(path: &Path) -> Result<ReadFrame> {
     let length = std::fs::metadata(path).map_err(|e| fail(e.to_string()))?.len();
     let pixels = width.checked_mul(height).filter(|&n| n as u64 / MOST_PIXELS_A_BYTE <= length);
     let pixels = pixels.ok_or_else(|| fail(format!("it is too short for {width}x{height} pixels")))?;
+    let origin = header.own_attributes.layer_position;
     let empty = ReadFrame {
+        origin: (origin.x(), origin.y()),
         width,
         height,
         color: vec![[0.0; 4]; pixels],

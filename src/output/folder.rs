@@ -45,7 +45,7 @@ impl OutputFolder {
 
     /// What stands there now.
     pub fn check(&self, frame: FrameId, settings_hash: &SettingsHash) -> FrameFile {
-        FrameFile::check(&self.file_of(frame), settings_hash)
+        FrameFile::check(&self.file_of(frame), frame, settings_hash)
     }
 
     /// False where the file system cannot lock: then nothing keeps a second run away.

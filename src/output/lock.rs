@@ -1,27 +1,29 @@
 //! Two runs must not write the same files: each run holds a lock on the names that it may write.
 //!
-//! The lock is the operating system's on a small file (`.buzz-<process>-<n>.lock`) in the output folder that lists the
+//! The lock is the operating system's on a small file (`.buzz-<letters>.lock`) in the output folder that lists the
 //! names. It ends with its process, however that dies; the file that is left then is removed by the next run. Runs that
 //! share a folder but no frames do not disturb each other.
 
-use super::write::explain;
+use super::temporary::Temporary;
+use super::write::{explain, open_to_lock};
 use crate::{Error, Result};
 use std::fs::{self, File, OpenOptions, TryLockError};
-use std::io::{Read, Write};
+use std::io::{self, Read, Write};
 use std::path::{Path, PathBuf};
-use std::sync::atomic::{AtomicU32, Ordering};
 use std::time::{Duration, Instant};
 
 /// A run's claim on file names in a folder; given up when dropped.
 #[derive(Debug)]
 pub struct FrameLock {
-    /// Holds the system's lock as long as it is open. `None` where the file system has no locks.
-    file: Option<File>,
-    path: PathBuf,
+    /// Holds the system's lock until it is removed. `None` where the file system has no locks.
+    file: Option<Temporary>,
 }
 
 /// How long another run may take to register before something must be wrong.
 const PATIENCE: Duration = Duration::from_secs(10);
+/// What locks' names begin and end with.
+const PREFIX: &str = ".buzz-";
+const SUFFIX: &str = ".lock";
 /// Taken for moments only, while a run looks for others and registers itself.
 const REGISTER: &str = ".buzz.lock";
 /// Largest list of names that is read from another run's lock.
@@ -35,33 +37,25 @@ impl FrameLock {
     /// # Errors
     /// [`Error::Output`] if another run holds one of the names, or the folder cannot be written.
     pub fn acquire(folder: &Path, names: &[String]) -> Result<Self> {
-        static COUNT: AtomicU32 = AtomicU32::new(0);
-        let count = COUNT.fetch_add(1, Ordering::Relaxed);
-        let path = folder.join(format!(".buzz-{}-{count}.lock", std::process::id()));
         let Some(register) = Register::enter(folder)? else {
-            return Ok(Self { file: None, path });
+            return Ok(Self { file: None });
         };
         refuse_if_claimed(folder, names)?;
-        let mut file = File::create(&path).map_err(|e| explain(&path, &e))?;
-        let lock = Self { file: Some(file.try_clone().map_err(|e| explain(&path, &e))?), path };
-        file.try_lock().map_err(|e| explain(&lock.path, &e.into()))?;
-        file.write_all(names.join("\n").as_bytes()).map_err(|e| explain(&lock.path, &e))?;
+        let mut file = Temporary::new(folder, PREFIX, SUFFIX).map_err(|e| explain(folder, &e))?;
+        let claim = |file: &mut File| {
+            file.try_lock()?;
+            file.write_all(names.join("\n").as_bytes())?;
+            // Other machines see what has reached the server.
+            file.sync_all()
+        };
+        claim(file.file()).map_err(|e| explain(folder, &e))?;
         drop(register);
-        Ok(lock)
+        Ok(Self { file: Some(file) })
     }
 
     /// False where the file system cannot lock: then nothing keeps a second run away.
     pub fn is_held(&self) -> bool {
         self.file.is_some()
-    }
-}
-
-impl Drop for FrameLock {
-    fn drop(&mut self) {
-        if self.file.is_some() {
-            // Nothing can be done about a failure here; the next run tidies up.
-            let _ = fs::remove_file(&self.path);
-        }
     }
 }
 
@@ -71,26 +65,29 @@ fn refuse_if_claimed(folder: &Path, names: &[String]) -> Result<()> {
     for entry in fs::read_dir(folder).map_err(|e| explain(folder, &e))? {
         let path = entry.map_err(|e| explain(folder, &e))?.path();
         let name = path.file_name().and_then(|n| n.to_str()).unwrap_or_default();
-        if !(name.starts_with(".buzz-") && name.ends_with(".lock")) {
+        if !(name.starts_with(PREFIX) && name.ends_with(SUFFIX)) {
             continue;
         }
-        // It may vanish while we look: its run has just ended.
-        let Ok(file) = File::open(&path) else { continue };
-        match file.try_lock() {
-            Ok(()) => {
-                let _ = fs::remove_file(&path);
-            }
-            Err(TryLockError::Error(_)) => {}
-            Err(TryLockError::WouldBlock) => {
-                let mut list = String::new();
-                file.take(LONGEST_LIST).read_to_string(&mut list).map_err(|e| explain(&path, &e))?;
-                if let Some(claimed) = list.lines().find(|n| wanted.contains(n)) {
-                    let message = format!(
-                        "another run ({name}) is writing it: wait for that run, or choose other --frames or another folder"
-                    );
-                    return Err(Error::output(folder.join(claimed), message));
-                }
-            }
+        if fs::metadata(&path).is_ok_and(|found| !found.is_file()) {
+            continue;
+        }
+        let file = match open_to_lock(&path) {
+            // It may vanish while we look: its run has just ended.
+            Err(e) if e.kind() == io::ErrorKind::NotFound => continue,
+            file => file.map_err(|e| explain(&path, &e))?,
+        };
+        // There are locks here, so what cannot be locked, whatever the reason, is taken to be held.
+        if file.try_lock().is_ok() {
+            let _ = fs::remove_file(&path);
+            continue;
+        }
+        let mut list = String::new();
+        file.take(LONGEST_LIST).read_to_string(&mut list).map_err(|e| explain(&path, &e))?;
+        if let Some(claimed) = list.lines().find(|n| wanted.contains(n)) {
+            let message = format!(
+                "another run ({name}) is writing it: wait for that run, or choose other --frames or another folder"
+            );
+            return Err(Error::output(folder.join(claimed), message));
         }
     }
     Ok(())
@@ -107,6 +104,9 @@ impl Register {
     fn enter(folder: &Path) -> Result<Option<Self>> {
         let path = folder.join(REGISTER);
         let start = Instant::now();
+        if fs::metadata(&path).is_ok_and(|found| !found.is_file()) {
+            return Err(Error::output(path, "is no file, and in the way of locking the folder; remove it"));
+        }
         loop {
             let file = OpenOptions::new().write(true).create(true).truncate(false).open(&path);
             let file = file.map_err(|e| explain(&path, &e))?;
@@ -184,6 +184,21 @@ mod tests {
         assert!(!folder.path().join(".buzz-1-0.lock").exists());
         drop(lock);
         assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 0);
+    }
+
+    #[test]
+    fn a_live_lock_stays_whatever_the_process_is_called() {
+        let folder = tempfile::tempdir().unwrap();
+        let first = FrameLock::acquire(folder.path(), &names(1..10)).unwrap();
+        let locks = || fs::read_dir(folder.path()).unwrap().map(|e| e.unwrap().path()).collect::<Vec<_>>();
+        let before = locks();
+        assert_eq!(before.len(), 1);
+        // Not even runs with one process number, as in two containers, have a lock of the same name.
+        let second = FrameLock::acquire(folder.path(), &names(10..20)).unwrap();
+        drop(second);
+        assert_eq!(locks(), before);
+        FrameLock::acquire(folder.path(), &names(1..2)).unwrap_err();
+        drop(first);
     }
 
     #[test]

@@ -16,6 +16,7 @@ mod resume;
 mod review;
 mod runs;
 mod sink;
+mod temporary;
 mod thumbnails;
 mod write;
 
@@ -25,7 +26,7 @@ pub use hash::{SettingsHash, SettingsHasher};
 pub use lock::FrameLock;
 pub use memory::{MemorySink, NullSink};
 pub use naming::{NamePattern, number_in_name};
-pub use peak::peak_bytes;
+pub use peak::{most_bytes, peak_bytes};
 pub use report::{
     FrameRecord, FrameReport, IgnoredFeature, KeyFrame, Plan, Report, ReportInput, SceneSummary,
     SegmentRange, Settings, TotalSeconds, Totals,
@@ -34,6 +35,7 @@ pub use resume::FrameFile;
 pub use review::Review;
 pub use runs::{Run, RunSeconds, earlier_runs};
 pub use sink::ExrSink;
+pub use temporary::remove_temporary_files;
 pub use thumbnails::{Thumbnail, Thumbnails, WithThumbnails};
 pub use write::write_alone;
 pub(crate) use write::write_whole;

@@ -110,9 +110,9 @@ fn percent(text: &str) -> Option<(usize, &str)> {
     Some((width, after.strip_prefix('d')?))
 }
 
-/// The frame number in a file's name: the last run of digits before its ending; a hyphen before it is a minus sign
-/// unless it joins the number to a word (`walk-001.exr` is 1, `walk.-001.exr` is -1).
-pub fn number_in_name(name: &str) -> Option<i64> {
+/// The frame number in a file's name, between what stands before and after it: the last run of digits before its ending; a
+/// hyphen before it is a minus sign unless it joins the number to a word (`walk-001.exr` is 1, `walk.-001.exr` is -1).
+pub fn number_in_name(name: &str) -> Option<(&str, i64, &str)> {
     let stem = name.rsplit_once('.').map_or(name, |(stem, _)| stem);
     let end = stem.rfind(|c: char| c.is_ascii_digit())? + 1;
     let start = stem[..end]
@@ -120,14 +120,25 @@ pub fn number_in_name(name: &str) -> Option<i64> {
         .map_or(0, |i| i + stem[i..].chars().next().map_or(1, char::len_utf8));
     let number: i64 = stem[start..end].parse().ok()?;
     let before = stem[..start].strip_suffix('-');
-    let minus = before.is_some_and(|b| !b.ends_with(char::is_alphanumeric));
-    Some(if minus { -number } else { number })
+    let minus = before.filter(|b| !b.ends_with(char::is_alphanumeric));
+    let (before, number) = minus.map_or((&stem[..start], number), |before| (before, -number));
+    Some((before, number, &name[end..]))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use proptest::prelude::*;
+
+    fn number(name: &str) -> Option<i64> {
+        number_in_name(name).map(|(_, number, _)| number)
+    }
+
+    #[test]
+    fn what_is_not_the_number_is_the_sequences_name() {
+        assert_eq!(number_in_name("s010_v2.-0101.left.exr"), Some(("s010_v2.", -101, ".left.exr")));
+        assert_eq!(number_in_name("walk-0001.exr"), Some(("walk-", 1, ".exr")));
+    }
 
     fn name(pattern: &str, frame: i64) -> String {
         NamePattern::parse(pattern, "walk").unwrap().file_name(frame)
@@ -154,7 +165,7 @@ mod tests {
         assert_eq!(of("shot%04d.exr"), "shot.right.0007.exr");
         assert_eq!(of("%04d.exr"), "right.0007.exr");
         for pattern in [NamePattern::DEFAULT, "%04d.exr"] {
-            assert_eq!(number_in_name(&of(pattern)), Some(7));
+            assert_eq!(number(&of(pattern)), Some(7));
         }
     }
 
@@ -185,22 +196,22 @@ mod tests {
 
     #[test]
     fn other_renderers_names_are_read_too() {
-        assert_eq!(number_in_name("shot010_v2.0101.exr"), Some(101));
-        assert_eq!(number_in_name("0001.exr"), Some(1));
-        assert_eq!(number_in_name("-0001.exr"), Some(-1));
-        assert_eq!(number_in_name("walk-0001.exr"), Some(1));
-        assert_eq!(number_in_name("walk.-0001.exr"), Some(-1));
-        assert_eq!(number_in_name("walk0012.left.exr"), Some(12));
-        assert_eq!(number_in_name("walk.exr"), None);
-        assert_eq!(number_in_name("99999999999999999999.exr"), None);
-        assert_eq!(number_in_name(""), None);
+        assert_eq!(number("shot010_v2.0101.exr"), Some(101));
+        assert_eq!(number("0001.exr"), Some(1));
+        assert_eq!(number("-0001.exr"), Some(-1));
+        assert_eq!(number("walk-0001.exr"), Some(1));
+        assert_eq!(number("walk.-0001.exr"), Some(-1));
+        assert_eq!(number("walk0012.left.exr"), Some(12));
+        assert_eq!(number("walk.exr"), None);
+        assert_eq!(number("99999999999999999999.exr"), None);
+        assert_eq!(number(""), None);
     }
 
     proptest! {
         #[test]
         fn the_number_written_is_read_back(frame in -100_000i64..100_000, width in 1usize..9) {
             let pattern = NamePattern::parse(&format!("<stem>.%0{width}d.exr"), "a b-2").unwrap();
-            prop_assert_eq!(number_in_name(&pattern.file_name(frame)), Some(frame));
+            prop_assert_eq!(number(&pattern.file_name(frame)), Some(frame));
         }
 
         #[test]

@@ -218,6 +218,9 @@ pub struct TotalSeconds {
     pub accel: f64,
     /// Choosing key frames.
     pub plan: f64,
+    /// Frames that were not asked for, but from which others are inferred: their rays and inference.
+    #[serde(default)]
+    pub on_the_way: f64,
     /// Work that replaces tracing.
     pub infer: f64,
     /// Camera and shadow rays.
@@ -284,6 +287,14 @@ impl Report {
         }
     }
 
+    /// The report that a file holds, if it does.
+    pub fn read(path: &Path) -> Option<Self> {
+        // To open a pipe would wait for whoever writes to it.
+        std::fs::metadata(path).ok().filter(std::fs::Metadata::is_file)?;
+        let report: Self = serde_json::from_slice(&std::fs::read(path).ok()?).ok()?;
+        Some(report).filter(|r| r.schema == Self::SCHEMA)
+    }
+
     /// Writes `report.json`, whole or not at all.
     ///
     /// # Errors
@@ -332,6 +343,7 @@ impl Totals {
                 import: of_runs(|s| s.import),
                 accel: of_runs(|s| s.accel),
                 plan: of_runs(|s| s.plan),
+                on_the_way: of_runs(|s| s.on_the_way),
                 infer,
                 trace,
                 enhance,

@@ -2,11 +2,12 @@
 
 use super::SettingsHash;
 use super::exr::{
-    CHECKSUM, COUNTS, FRAME_KIND, INFERRED_FROM, MAGIC, NO_CHECKSUM, SETTINGS_HASH, counts_from_text,
+    CHECKSUM, COUNTS, FRAME, FRAME_KIND, INFERRED_FROM, MAGIC, NO_CHECKSUM, SETTINGS_HASH, VIEW,
+    counts_from_text,
 };
-use crate::frame::{FrameKind, FrameStats};
+use crate::frame::{FrameId, FrameKind, FrameStats, StereoEye};
 use std::collections::HashMap;
-use std::fs::File;
+use std::fs::{self, File};
 use std::io::{self, Read, Seek, SeekFrom};
 use std::path::Path;
 
@@ -22,15 +23,21 @@ pub enum FrameFile {
 }
 
 impl FrameFile {
-    /// Looks at the file `path`. Nothing in it is trusted: damage of any kind makes it stale, and no size that it states
+    /// Looks at the file `path`, where `frame` should be. Nothing in it is trusted: damage of any kind makes it stale, and no size that it states
     /// is allocated before the file has been seen to be that large.
-    pub fn check(path: &Path, settings_hash: &SettingsHash) -> Self {
-        let file = match File::open(path) {
-            Ok(file) => file,
+    pub fn check(path: &Path, frame: FrameId, settings_hash: &SettingsHash) -> Self {
+        let file = match fs::metadata(path) {
+            // To open a pipe would wait for whoever writes to it.
+            Ok(metadata) if !metadata.is_file() => return Self::Stale("it is not a file".into()),
+            Ok(_) => File::open(path),
             Err(error) if error.kind() == io::ErrorKind::NotFound => return Self::Missing,
+            Err(error) => Err(error),
+        };
+        let file = match file {
+            Ok(file) => file,
             Err(error) => return Self::Stale(error.to_string()),
         };
-        match inspect(file, settings_hash) {
+        match inspect(file, frame, settings_hash) {
             Ok(Ok((stats, kind))) => Self::Complete(stats, kind),
             Ok(Err(reason)) => Self::Stale(reason.to_string()),
             Err(error) => Self::Stale(error.to_string()),
@@ -43,12 +50,8 @@ const LONGEST_HEADER: u64 = 16 << 20;
 
 type Verdict = Result<(FrameStats, FrameKind), &'static str>;
 
-fn inspect(mut file: File, settings_hash: &SettingsHash) -> io::Result<Verdict> {
-    let metadata = file.metadata()?;
-    if !metadata.is_file() {
-        return Ok(Err("it is not a file"));
-    }
-    let length = metadata.len();
+fn inspect(mut file: File, frame: FrameId, settings_hash: &SettingsHash) -> io::Result<Verdict> {
+    let length = file.metadata()?.len();
     let mut head = Vec::new();
     (&mut file).take(LONGEST_HEADER).read_to_end(&mut head)?;
     let Some(header) = Header::parse(&head) else {
@@ -59,6 +62,10 @@ fn inspect(mut file: File, settings_hash: &SettingsHash) -> io::Result<Verdict> 
     };
     if hash != settings_hash.as_str() {
         return Ok(Err("its input or settings were others"));
+    }
+    let eye = header.text(VIEW);
+    if header.i32(FRAME).map(i64::from) != Some(frame.number) || eye != frame.eye.map(StereoEye::name) {
+        return Ok(Err("it is another frame"));
     }
     let found = (|| {
         let stats = counts_from_text(header.text(COUNTS)?)?;

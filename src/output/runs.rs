@@ -35,6 +35,9 @@ pub struct RunSeconds {
     pub accel: f64,
     /// Choosing key frames.
     pub plan: f64,
+    /// Frames that were not asked for, but from which others are inferred.
+    #[serde(default)]
+    pub on_the_way: f64,
     /// From start to end.
     pub wall: f64,
 }
@@ -42,8 +45,8 @@ pub struct RunSeconds {
 impl Run {
     /// As reports have it.
     pub(super) fn rounded(mut self) -> Self {
-        let RunSeconds { import, accel, plan, wall } = &mut self.seconds;
-        for seconds in [import, accel, plan, wall] {
+        let RunSeconds { import, accel, plan, on_the_way, wall } = &mut self.seconds;
+        for seconds in [import, accel, plan, on_the_way, wall] {
             *seconds = millionths(*seconds);
         }
         self
@@ -66,7 +69,8 @@ pub fn earlier_runs(
         return runs;
     }
     for name in report_names(folder, own) {
-        let Some(report) = read(&folder.join(name)).filter(|r| r.settings_hash == *settings_hash) else {
+        let Some(report) = Report::read(&folder.join(name)).filter(|r| r.settings_hash == *settings_hash)
+        else {
             continue;
         };
         let mut used = false;
@@ -90,11 +94,6 @@ fn report_names(folder: &Path, own: &str) -> BTreeSet<String> {
     let entries = std::fs::read_dir(folder).into_iter().flatten();
     let names = entries.filter_map(|entry| entry.ok()?.file_name().into_string().ok());
     names.filter(|n| n == own || n.starts_with("report") && n.ends_with(".json")).collect()
-}
-
-fn read(path: &Path) -> Option<Report> {
-    let report: Report = serde_json::from_slice(&std::fs::read(path).ok()?).ok()?;
-    Some(report).filter(|r| r.schema == Report::SCHEMA)
 }
 
 /// A frame's times, if the report has any.

@@ -1,78 +1,78 @@
 //! Files that are whole or not there: written beside their place under another name, forced to disk, then renamed.
 
+use super::temporary::Temporary;
 use crate::{Error, Result};
 use std::collections::HashSet;
-use std::fs::{self, File};
+use std::fs::{self, File, OpenOptions, TryLockError};
 use std::io::{self, Write};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 /// Writes `parts` one after the other as the file `path`.
 ///
 /// # Errors
 /// [`Error::Output`]; then nothing is left behind, and what was at `path` before is still there.
 pub(crate) fn write_whole<'a>(path: &Path, parts: impl IntoIterator<Item = &'a [u8]>) -> Result<()> {
-    let temporary = temporary_name(path);
-    write_and_rename(&temporary, path, parts).map_err(|error| {
-        // It may not exist; the error that matters is the first one.
-        let _ = fs::remove_file(&temporary);
-        explain(path, &error)
-    })
+    write_and_rename(path, parts).map_err(|error| explain(path, &error))
 }
 
-/// Writes a file that no other run writes, whole or not at all: makes its folder if need be, and removes what a killed run
-/// left.
+/// Writes a file whole or not at all: makes its folder if need be, and removes what a killed run left.
 ///
 /// # Errors
 /// [`Error::Output`].
 pub fn write_alone(path: &Path, bytes: &[u8]) -> Result<()> {
-    let folder = match path.parent() {
-        Some(folder) if !folder.as_os_str().is_empty() => folder,
-        _ => Path::new("."),
-    };
+    let folder = folder_of(path);
     fs::create_dir_all(folder).map_err(|e| explain(folder, &e))?;
     let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
     remove_leftovers(folder, &HashSet::from([name]))?;
     write_whole(path, [bytes])
 }
 
-fn write_and_rename<'a>(
-    temporary: &Path,
-    path: &Path,
-    parts: impl IntoIterator<Item = &'a [u8]>,
-) -> io::Result<()> {
-    let mut file = File::create(temporary)?;
+fn write_and_rename<'a>(path: &Path, parts: impl IntoIterator<Item = &'a [u8]>) -> io::Result<()> {
+    let name = path.file_name().unwrap_or_default().to_string_lossy();
+    let mut temporary = Temporary::new(folder_of(path), &format!(".{name}."), ".tmp")?;
+    let file = temporary.file();
+    // So that no other run takes it for what a killed one left; where there are no locks, it has to do without.
+    let _ = file.try_lock();
     for part in parts {
         file.write_all(part)?;
     }
     // A rename may reach the disk before the contents do: without this, a power cut leaves an empty frame.
     file.sync_all()?;
-    drop(file);
-    fs::rename(temporary, path)
+    temporary.rename(path)
 }
 
-/// `.<name>.<process>.tmp` in the same folder: a rename across file systems would not be atomic.
-fn temporary_name(path: &Path) -> PathBuf {
-    let name = path.file_name().unwrap_or_default().to_string_lossy();
-    path.with_file_name(format!(".{name}.{}.tmp", std::process::id()))
+/// The folder that a file is in.
+pub(super) fn folder_of(path: &Path) -> &Path {
+    path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."))
 }
 
-/// Removes what killed runs left of the files `names` in `folder`. Call it only while nobody else may write them.
+/// Removes what killed runs left of the files `names` in `folder`, but for what a live one is writing.
 pub(super) fn remove_leftovers(folder: &Path, names: &HashSet<String>) -> Result<()> {
     let entries = fs::read_dir(folder).map_err(|e| explain(folder, &e))?;
     for entry in entries {
         let entry = entry.map_err(|e| explain(folder, &e))?;
         let ours = entry.file_name().to_str().and_then(temporary_of).is_some_and(|name| names.contains(name));
-        if ours {
+        if ours && !is_being_written(&entry.path()) {
             fs::remove_file(entry.path()).map_err(|e| explain(&entry.path(), &e))?;
         }
     }
     Ok(())
 }
 
+/// True if a live run holds the file's lock.
+fn is_being_written(path: &Path) -> bool {
+    open_to_lock(path).is_ok_and(|file| matches!(file.try_lock(), Err(TryLockError::WouldBlock)))
+}
+
+/// Opens another run's file. Network file systems lock only what is open for writing; another user's may not be.
+pub(super) fn open_to_lock(path: &Path) -> io::Result<File> {
+    OpenOptions::new().read(true).write(true).open(path).or_else(|_| File::open(path))
+}
+
 /// The file for which `name` is a temporary name.
 fn temporary_of(name: &str) -> Option<&str> {
-    let (name, process) = name.strip_prefix('.')?.strip_suffix(".tmp")?.rsplit_once('.')?;
-    (!process.is_empty() && process.bytes().all(|b| b.is_ascii_digit())).then_some(name)
+    let (name, letters) = name.strip_prefix('.')?.strip_suffix(".tmp")?.rsplit_once('.')?;
+    (!letters.is_empty() && letters.bytes().all(|b| b.is_ascii_alphanumeric())).then_some(name)
 }
 
 /// An error of the file system, with what the user can do about it.
@@ -86,7 +86,8 @@ pub(super) fn explain(path: &Path, error: &io::Error) -> Error {
         }
         io::ErrorKind::NotFound => ": see whether its folder is there",
         io::ErrorKind::FileTooLarge => ": raise the limit on file sizes, then run again with --skip-existing",
-        io::ErrorKind::NotADirectory => ": it must be a folder",
+        io::ErrorKind::NotADirectory | io::ErrorKind::AlreadyExists => ": it must be a folder",
+        io::ErrorKind::IsADirectory => ": it must be a file; move the folder away",
         io::ErrorKind::StaleNetworkFileHandle | io::ErrorKind::TimedOut => {
             ": see whether the folder is still connected, then run again with --skip-existing"
         }
@@ -128,11 +129,29 @@ mod tests {
     }
 
     #[test]
+    fn what_a_live_run_writes_is_no_leftover() {
+        let folder = tempfile::tempdir().unwrap();
+        let mut live = Temporary::new(folder.path(), ".a.0001.exr.", ".tmp").unwrap();
+        live.file().try_lock().unwrap();
+        let names = HashSet::from(["a.0001.exr".to_string()]);
+        remove_leftovers(folder.path(), &names).unwrap();
+        assert_eq!(listing(folder.path()).len(), 1);
+        live.file().unlock().unwrap();
+        remove_leftovers(folder.path(), &names).unwrap();
+        assert!(listing(folder.path()).is_empty());
+    }
+
+    #[test]
     fn only_our_own_leftovers_are_removed() {
         let folder = tempfile::tempdir().unwrap();
-        let kept =
-            [".a.0002.exr.12.tmp", ".a.0001.exr.x.tmp", ".a.0001.exr.tmp", "a.0001.exr.12.tmp", "a.0001.exr"];
-        for name in kept.iter().chain(&[".a.0001.exr.12.tmp", ".a.0001.exr.345.tmp"]) {
+        let kept = [
+            ".a.0002.exr.12.tmp",
+            ".a.0001.exr.x-y.tmp",
+            ".a.0001.exr.tmp",
+            "a.0001.exr.12.tmp",
+            "a.0001.exr",
+        ];
+        for name in kept.iter().chain(&[".a.0001.exr.12.tmp", ".a.0001.exr.x3Yz.tmp"]) {
             fs::write(folder.path().join(name), "").unwrap();
         }
         remove_leftovers(folder.path(), &HashSet::from(["a.0001.exr".to_string()])).unwrap();

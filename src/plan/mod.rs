@@ -14,6 +14,7 @@ pub use weights::{SHADOW_RAY, Weights};
 use crate::frame::{FrameKind, Quality};
 use motion::find_cuts;
 use segments::{Chain, Range, divide};
+use std::collections::BTreeSet;
 
 /// Longest segment where the user gives none. The cost model ends segments long before, unless the camera rests.
 pub const LONGEST_SEGMENT: u32 = 129;
@@ -131,6 +132,19 @@ pub struct PlanOptions {
     /// How many machines render at the same time, at least 1: the plan is for the one that takes longest to be done as
     /// soon as possible.
     pub workers: usize,
+}
+
+impl Plan {
+    /// How many frames beside those that are `wanted` have to be made so that these can be: the key frames of their segments,
+    /// and all between.
+    pub fn on_the_way(&self, wanted: &BTreeSet<i64>) -> usize {
+        let of_segment = |&Segment { key, first, last }: &Segment| {
+            let wanted: Vec<i64> = wanted.range(first..=last).copied().collect();
+            let (Some(&from), Some(&to)) = (wanted.first(), wanted.last()) else { return 0 };
+            (to.max(key) - from.min(key) + 1) as usize - wanted.len()
+        };
+        self.segments.iter().map(of_segment).sum()
+    }
 }
 
 /// Plans a sequence from its path (consecutive frames; at least one).

@@ -164,6 +164,7 @@ fn a_second_signal_does_no_harm() {
         let outcome = running.end();
         assert!(codes.contains(&outcome.code), "{outcome:?}");
         assert_same_bytes(&out, reference());
+        assert_eq!(leftovers(&out), [""; 0], "no partial file remains");
         assert_taken_up(&out);
     }
 }
@@ -327,4 +328,88 @@ fn a_changed_input_makes_all_frames_anew() {
         assert!(report["frames"].as_array().unwrap().iter().all(|f| f["skipped"] == false));
         assert_eq!(report["runs"].as_array().unwrap().len(), 1, "the run before has no part in it");
     }
+}
+
+#[test]
+fn frames_under_others_names_are_made_anew() {
+    let (_folder, scene, out, whole) = rendered();
+    fs::rename(out.join("s.0001.exr"), out.join("x")).unwrap();
+    fs::rename(out.join("s.0003.exr"), out.join("s.0001.exr")).unwrap();
+    fs::rename(out.join("x"), out.join("s.0003.exr")).unwrap();
+    let said = again(&scene, &out, "--skip-existing").ok().err;
+    assert!(
+        said.contains("another frame") && said.contains("1 more") && said.contains("2 of 4 frames"),
+        "{said}"
+    );
+    assert_eq!(assert_same_bytes(&out, &whole), 4);
+}
+
+#[test]
+fn another_scenes_report_is_not_lost() {
+    let (folder, _scene, out, _whole) = rendered();
+    let other = Stage::drifting(4).write(&folder.path().join("other.gltf"));
+    let before = fs::read(out.join("report.json")).unwrap();
+    again(&other, &out, "").refused(4, &["report.json", "s.gltf", "--report"]);
+    again(&other, &out, &format!("--report {}", folder.path().join("own/r.json").display())).ok();
+    assert!(folder.path().join("own/r.html").exists());
+    assert_eq!(fs::read(out.join("report.json")).unwrap(), before);
+    again(&other, &out, "--overwrite").ok();
+    assert!(json(&out.join("report.json"))["input"].as_str().unwrap().ends_with("other.gltf"));
+}
+
+#[test]
+fn what_a_run_reads_is_not_what_it_replaces() {
+    let (folder, scene, out, _whole) = rendered();
+    let renamed = folder.path().join("scene.json");
+    fs::copy(&scene, &renamed).unwrap();
+    let before = fs::read(&renamed).unwrap();
+    let report = format!("--overwrite --report {}", renamed.display());
+    again(&renamed, &out, &report).refused(2, &["--report", "scene.json"]);
+    again(&scene, &out, &format!("--skip-existing --report {}", renamed.display()))
+        .refused(4, &["scene.json", "--report"]);
+    assert_eq!(fs::read(&renamed).unwrap(), before);
+}
+
+#[test]
+fn pipes_in_place_of_files_are_not_waited_for() {
+    let (folder, scene, out, whole) = rendered();
+    let pipe = |path: &Path| assert!(Command::new("mkfifo").arg(path).status().unwrap().success());
+    fs::remove_file(out.join("s.0001.exr")).unwrap();
+    for name in ["s.0001.exr", "report.9.json", ".buzz-1-0.lock"] {
+        pipe(&out.join(name));
+    }
+    let said = again(&scene, &out, "--skip-existing").ok().err;
+    assert!(said.contains("s.0001.exr: it is not a file"), "{said}");
+    assert_eq!(assert_same_bytes(&out, &whole), 4);
+    let compared = folder.path().join("compared");
+    fs::create_dir(&compared).unwrap();
+    fs::copy(out.join("s.0000.exr"), compared.join("s.0000.exr")).unwrap();
+    pipe(&compared.join("s.0001.exr"));
+    crate::rig::buzz([Path::new("compare"), &compared, &whole]).ok();
+    again(&scene, &out, "--overwrite --plan /dev/zero").refused(3, &["/dev/zero"]);
+}
+
+#[test]
+fn a_limit_on_file_sizes_ends_the_run_with_4_and_leaves_nothing() {
+    let (folder, out) = fresh();
+    let scene = Stage::drifting(4).write(&folder.path().join("s.gltf"));
+    let script = format!(
+        "ulimit -f 1; exec {BINARY} {} {} -r 320x180 --progress none",
+        scene.display(),
+        out.display()
+    );
+    let output = Command::new("sh").args(["-c", &script]).output().unwrap();
+    let said = String::from_utf8(output.stderr).unwrap();
+    assert_eq!(output.status.code(), Some(4), "{said}");
+    assert!(said.contains("raise the limit"), "{said}");
+    assert_eq!(listing(&out), [""; 0]);
+}
+
+#[test]
+fn an_image_that_no_memory_can_hold_is_refused_before_it_is_rendered() {
+    let (folder, out) = fresh();
+    let scene = Stage::drifting(2).write(&folder.path().join("s.gltf"));
+    // Even where everything else is shared, a pixel takes a hundred bytes.
+    run(&scene, &out, "-r 65536x60000 --progress none").refused(2, &["--memory", "MiB", "--resolution"]);
+    assert_eq!(frames_in(&out), [""; 0]);
 }

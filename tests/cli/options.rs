@@ -151,6 +151,56 @@ fn a_file_without_a_camera_goes_round_on_a_turntable() {
 }
 
 #[test]
+fn a_model_in_which_nothing_shines_is_lit_on_a_turntable_and_said_to_be_black_elsewhere() {
+    let (folder, out) = fresh();
+    let mut stage = Stage::drifting(2);
+    let unlit = stage.json["nodes"].as_array_mut().unwrap();
+    unlit.iter_mut().for_each(|node| drop(node.as_object_mut().unwrap().remove("extensions")));
+    stage.json["extensions"].as_object_mut().unwrap().remove("KHR_lights_punctual");
+    stage.json["scenes"][0].as_object_mut().unwrap().remove("extras");
+    let scene = stage.write(&folder.path().join("s.gltf"));
+    let brightest = |out: &Path| first_frame(out)["G"].iter().copied().fold(0.0, f32::max);
+    let said = run(&scene, &out, "-r 32x18 --progress none").ok().err;
+    assert!(said.contains("nothing in the scene shines"), "{said}");
+    assert_eq!(brightest(&out), 0.0);
+    let lit = folder.path().join("lit");
+    let said = run(&scene, &lit, "-r 32x18 --progress none --turntable 3").ok().err;
+    assert!(!said.contains("shines"), "{said}");
+    assert!(brightest(&lit) > 0.2);
+}
+
+#[test]
+fn what_is_no_obj_is_refused() {
+    let (folder, out) = fresh();
+    let scene = Stage::drifting(2).write(&folder.path().join("s.gltf"));
+    let junk = folder.path().join("junk.obj");
+    fs::write(&junk, "hallo\n").unwrap();
+    run(&scene, &out, &format!("-r 32x18 --geometry {}", junk.display())).refused(3, &["junk.obj", "OBJ"]);
+    run(&scene, &out, &format!("-r 32x18 --geometry {}", scene.display())).refused(3, &["s.gltf", "OBJ"]);
+}
+
+#[test]
+fn frames_outside_of_the_range_are_rendered_and_warned_of() {
+    let (folder, out) = fresh();
+    let scene = Stage::drifting(3).write(&folder.path().join("s.gltf"));
+    let said = run(&scene, &out, "-r 16x9 -f 1-6 --progress none").ok().err;
+    assert!(said.contains("4 of them are not in the scene's range, 0-2"), "{said}");
+    let report = json(&out.join("report.1-6.json"));
+    assert_eq!(report["warnings"].as_array().unwrap().len(), 1, "{}", report["warnings"]);
+}
+
+#[test]
+fn frames_on_the_way_are_told_and_counted() {
+    let (_folder, out) = fresh();
+    let said = run(&courtyard(), &out, "-r 32x18 -f 0 --progress plain").ok();
+    let lines = said.err.lines().filter(|l| l.contains("on the way, ")).count();
+    assert!(lines > 0 && said.err.lines().all(|l| l.starts_with("frame ")), "{}", said.err);
+    assert!(said.out.contains("frames on the way"), "{}", said.out);
+    let report = json(&out.join("report.0-0.json"));
+    assert!(report["totals"]["seconds"]["on_the_way"].as_f64().unwrap() > 0.0);
+}
+
+#[test]
 fn an_obj_is_seen_through_another_files_camera() {
     let (folder, out) = fresh();
     let path = |name: &str| folder.path().join(name);

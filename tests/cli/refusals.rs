@@ -169,5 +169,10 @@ fn comparisons_tell_what_they_miss() {
     let worst = differs["worst"]["psnr_db"].as_f64().unwrap();
     assert_eq!(compare(&out, &other, &format!("--fail-below {}", worst + 0.1)).code, 1);
     compare(&out, &other, &format!("--fail-below {}", worst - 0.1)).ok();
+    // A frame that is not there fails, too.
+    fs::remove_file(other.join("s.0001.exr")).unwrap();
+    let missing = compare(&other, &out, "--fail-below 0");
+    assert_eq!(missing.code, 1);
+    assert!(missing.err.contains("1 of the reference are not there"), "{}", missing.err);
     compare(&out, &other, "--fail-below nan").refused(2, &["--fail-below"]);
 }

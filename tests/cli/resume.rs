@@ -55,13 +55,24 @@ fn overwriting_replaces_them() {
 #[test]
 fn what_decides_no_pixel_keeps_them() {
     let (_folder, scene, out) = rendered();
-    for same in ["", "-j 1", "--progress plain", "-f 1-2", "--audit"] {
+    for same in ["", "-j 1", "--progress plain", "-f 1-2"] {
         run(&scene, &out, &format!("-r 32x18 --skip-existing {same}")).ok();
         assert_eq!(kept(&out), 4, "{same}");
     }
     let report = json(&out.join("report.json"));
     assert_eq!(report["totals"]["frames"], 4);
     assert!(report["frames"].as_array().unwrap().iter().all(|f| f["skipped"] == true));
+}
+
+#[test]
+fn frames_that_were_not_audited_are_made_anew_to_be_audited() {
+    let (_folder, scene, out) = rendered();
+    let said = again(&scene, &out, "--skip-existing --audit").ok().err;
+    assert!(said.contains("not audited") && said.contains("3 more"), "{said}");
+    assert_eq!(kept(&out), 0);
+    let said = again(&scene, &out, "--skip-existing --audit").ok().err;
+    assert!(said.contains("4 of 4 frames are there already"), "{said}");
+    assert!(json(&out.join("report.json"))["totals"]["hidden"].is_u64());
 }
 
 #[test]

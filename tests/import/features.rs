@@ -811,6 +811,38 @@ fn a_worlds_picture_is_loaded_from_beside_the_file() {
     }
 }
 
+#[test]
+fn pictures_that_are_not_whole_are_refused() {
+    let folder = TempDir::new().unwrap();
+    let file = folder.path().join("scene.gltf");
+    let read = |name: &str| {
+        let mut gltf = Gltf::new();
+        gltf.json["scenes"][0]["extras"] = json!({"buzz": {"world": {"image": name}}});
+        fs::write(&file, gltf.text()).unwrap();
+        import(&file, &ImportOptions::default()).map(|_| ()).map_err(|e| e.to_string())
+    };
+    let noise =
+        image::RgbImage::from_fn(64, 64, |x, y| image::Rgb([(x * y) as u8, (x * 7) as u8, (y * 13) as u8]));
+    let whole = folder.path().join("whole.jpg");
+    noise.save(&whole).unwrap();
+    let bytes = fs::read(&whole).unwrap();
+    fs::write(folder.path().join("cut.jpg"), &bytes[..bytes.len() / 2]).unwrap();
+    assert_eq!(read("whole.jpg"), Ok(()));
+    assert!(read("cut.jpg").unwrap_err().contains("cut off"));
+
+    // What an EXR stores is its data window, which may be far larger than the picture that it shows.
+    let picture = image::Rgb32FImage::from_pixel(4, 2, image::Rgb([2.0, 1.0, 0.5]));
+    image::DynamicImage::ImageRgb32F(picture).save(folder.path().join("sky.exr")).unwrap();
+    let mut bytes = fs::read(folder.path().join("sky.exr")).unwrap();
+    assert_eq!(read("sky.exr"), Ok(()));
+    let name = b"dataWindow\0box2i\0";
+    let at = bytes.windows(name.len()).position(|part| part == name).unwrap() + name.len() + 4;
+    bytes[at + 8..at + 12].copy_from_slice(&160_000_000_i32.to_le_bytes());
+    fs::write(folder.path().join("sky.exr"), bytes).unwrap();
+    let refused = read("sky.exr").unwrap_err();
+    assert!(refused.contains("world/image: the image cannot be read"), "{refused}");
+}
+
 // ---- animation -------------------------------------------------------------------------------------------------
 
 #[test]

@@ -92,13 +92,26 @@ fn several_sequences_in_a_folder_are_kept_apart() {
 }
 
 #[test]
+fn shots_with_numbers_in_their_names_are_kept_apart() {
+    let folder = tempfile::tempdir().unwrap();
+    let (a, b) = (folder.path().join("a"), folder.path().join("b"));
+    for shot in ["s010", "s020"] {
+        for place in [&a, &b] {
+            write(place, &format!("{shot}.0001.exr"), &plain(1, FrameKind::Traced));
+        }
+    }
+    let files = |of: &Comparison| of.frames.iter().map(|f| f.file.clone()).collect::<Vec<_>>();
+    assert_eq!(files(&compare(&a, &b, None).unwrap()), ["s010.0001.exr", "s020.0001.exr"]);
+}
+
+#[test]
 fn what_cannot_be_compared_is_an_error_that_names_it() {
     let folder = tempfile::tempdir().unwrap();
     let (a, b) = (folder.path().join("a"), folder.path().join("b"));
     assert_eq!(compare(&a, &b, None).unwrap_err().exit_code(), 3);
     write(&a, "walk.0001.exr", &plain(1, FrameKind::Traced));
     write(&b, "walk.0002.exr", &plain(1, FrameKind::Traced));
-    assert!(compare(&a, &b, None).unwrap_err().to_string().contains("frame number"));
+    assert!(compare(&a, &b, None).unwrap_err().to_string().contains("the name and number of one"));
     write(&b, "walk.0001.exr", &default_layers(frame(1, FrameKind::Traced, &Shape::whole(12, 16))));
     assert!(compare(&a, &b, None).unwrap_err().to_string().contains("24x16"));
     fs::write(b.join("walk.0001.exr"), "not an image").unwrap();

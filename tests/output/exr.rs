@@ -1,7 +1,7 @@
 //! The files that frames become: read back by the `exr` crate, and by Python's OpenEXR and OpenImageIO.
 
 use crate::support::{Shape, default_layers, frame, hash, options};
-use buzz::frame::{Frame, FrameKind, Window};
+use buzz::frame::{Frame, FrameId, FrameKind, StereoEye, Window};
 use buzz::output::exr::encode;
 use buzz::output::{Compression, ExrSink, FrameFile, NamePattern, OutputFolder, SettingsHasher};
 use buzz::sequence::FrameSink;
@@ -325,10 +325,14 @@ fn a_failure_stops_the_sink_and_leaves_no_partial_file() {
     // Frames that were under way beside the failing one may be there, but whole; nothing else is.
     let names: Vec<String> =
         fs::read_dir(folder.path()).unwrap().map(|e| e.unwrap().file_name().into_string().unwrap()).collect();
+    let number = |name: &str| buzz::output::number_in_name(name).unwrap().1;
     for name in names.iter().filter(|n| *n != "test.0002.exr") {
         assert!(name.starts_with("test.000") && name.ends_with(".exr"), "{names:?}");
         assert!(
-            matches!(FrameFile::check(&folder.path().join(name), &hash()), FrameFile::Complete(..)),
+            matches!(
+                FrameFile::check(&folder.path().join(name), number(name).into(), &hash()),
+                FrameFile::Complete(..)
+            ),
             "{name}"
         );
     }
@@ -350,9 +354,9 @@ fn damaged_files_are_never_taken_for_whole() {
     let path = folder.path().join("f.exr");
     let check = |bytes: &[u8]| {
         fs::write(&path, bytes).unwrap();
-        FrameFile::check(&path, &hash())
+        FrameFile::check(&path, 1.into(), &hash())
     };
-    assert_eq!(FrameFile::check(&path, &hash()), FrameFile::Missing);
+    assert_eq!(FrameFile::check(&path, 1.into(), &hash()), FrameFile::Missing);
     for compression in [Compression::Zip, Compression::None, Compression::Piz] {
         let small = default_layers(frame(1, FrameKind::Traced, &Shape::whole(5, 40)));
         let whole = bytes_of(&small, compression);
@@ -380,9 +384,15 @@ fn files_of_other_settings_programs_and_kinds_are_stale() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("f.exr");
     fs::write(&path, bytes_of(&frame(1, FrameKind::Traced, &Shape::whole(9, 9)), Compression::Zip)).unwrap();
+    assert!(matches!(FrameFile::check(&path, 1.into(), &hash()), FrameFile::Complete(..)));
+    // Frames that were renamed, and eyes that were exchanged.
+    let left = FrameId { number: 1, eye: Some(StereoEye::Left) };
+    for other in [2.into(), left] {
+        assert_eq!(FrameFile::check(&path, other, &hash()), FrameFile::Stale("it is another frame".into()));
+    }
     let other = SettingsHasher::new().feed("test", "2").finish();
-    assert!(matches!(FrameFile::check(&path, &other), FrameFile::Stale(_)));
+    assert!(matches!(FrameFile::check(&path, 1.into(), &other), FrameFile::Stale(_)));
     exr::prelude::write_rgb_file(&path, 8, 8, |_, _| (0.0f32, 0.0f32, 0.0f32)).unwrap();
-    assert!(matches!(FrameFile::check(&path, &hash()), FrameFile::Stale(_)));
-    assert!(matches!(FrameFile::check(folder.path(), &hash()), FrameFile::Stale(_)));
+    assert!(matches!(FrameFile::check(&path, 1.into(), &hash()), FrameFile::Stale(_)));
+    assert!(matches!(FrameFile::check(folder.path(), 1.into(), &hash()), FrameFile::Stale(_)));
 }

@@ -17,6 +17,10 @@ use glam::{DMat4, DVec3, DVec4};
 /// Name of the attribute that identifies a run's settings.
 pub(crate) const SETTINGS_HASH: &str = "buzz/settingsHash";
 /// Name of the attribute that says `traced` or `inferred`.
+/// The frame's number (OpenEXR's standard attribute).
+pub(crate) const FRAME: &str = "imageCounter";
+/// Whose eye's it is, in stereo (OpenEXR's standard attribute).
+pub(crate) const VIEW: &str = "view";
 pub(crate) const FRAME_KIND: &str = "buzz/frameKind";
 /// Name of the attribute with the neighbour from which a frame was inferred.
 pub(crate) const INFERRED_FROM: &str = "buzz/inferredFrom";
@@ -83,7 +87,7 @@ fn attributes(
         ("software", text(SOFTWARE)),
         ("Software", text(SOFTWARE)),
         ("comments", text(&comments(frame, options))),
-        ("imageCounter", A::I32(clamp_i32(frame.number))),
+        (FRAME, A::I32(clamp_i32(frame.number))),
         ("framesPerSecond", A::Rational((clamp_i32(options.fps.numerator.into()), options.fps.denominator))),
         // A point in time: there is no motion blur.
         ("expTime", A::F32(0.0)),
@@ -97,7 +101,7 @@ fn attributes(
         all.push(("cameraLabel", text(&frame.camera)));
     }
     if let Some(eye) = frame.eye {
-        all.push(("view", text(eye.name())));
+        all.push((VIEW, text(eye.name())));
     }
     let sensor = sensor(view);
     all.push(("sensorOverallDimensions", A::FloatVec2(Vec2(sensor.0 as f32, sensor.1 as f32))));

@@ -11,7 +11,9 @@ mod header;
 
 pub use chunk::Compression;
 pub(crate) use counts::from_text as counts_from_text;
-pub(crate) use header::{CHECKSUM, COUNTS, FRAME_KIND, INFERRED_FROM, MAGIC, NO_CHECKSUM, SETTINGS_HASH};
+pub(crate) use header::{
+    CHECKSUM, COUNTS, FRAME, FRAME_KIND, INFERRED_FROM, MAGIC, NO_CHECKSUM, SETTINGS_HASH, VIEW,
+};
 
 use super::SettingsHash;
 use crate::frame::Frame;

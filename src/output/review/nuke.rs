@@ -10,7 +10,7 @@ impl Review<'_> {
         let folder = if base.starts_with("..") {
             format!("\\[file dirname \\[value root.name]]/{base}")
         } else {
-            base.to_string()
+            quoted(base)
         };
         let file = format!("{folder}{}%0{digits}d{}", quoted(prefix), quoted(suffix));
         let (width, height, fps) = (self.width, self.height, self.fps.value());

@@ -1,0 +1,155 @@
+//! What an output folder holds already: frames that may stay, and reports that must not be lost.
+
+use super::args::ConvertArgs;
+use super::convert::pictures_of;
+use super::interrupt::Interrupt;
+use super::say;
+use anyhow::Result;
+use buzz::error::Error;
+use buzz::frame::FrameId;
+use buzz::output::{FrameFile, FrameRecord, OutputFolder, Report, SettingsHash};
+use buzz::sequence::{Observer, Settings};
+use rayon::prelude::*;
+use std::collections::BTreeSet;
+use std::path::{Path, PathBuf};
+
+/// Frames that are there already and may stay; an error if some are there and nothing says what to do with them. Says how
+/// many are kept, and why others are not.
+pub fn existing(
+    folder: &OutputFolder,
+    frames: &BTreeSet<i64>,
+    hash: &SettingsHash,
+    settings: &Settings,
+    args: &ConvertArgs,
+    interrupt: &Interrupt,
+) -> Result<Vec<FrameRecord>> {
+    if args.output.overwrite {
+        return Ok(Vec::new());
+    }
+    if !args.output.skip_existing {
+        let pictures = || frames.iter().flat_map(|&number| pictures_of(number, settings));
+        if let Some(path) = pictures().map(|id| folder.file_of(id)).find(|path| path.exists()) {
+            let message = "is there already; give --skip-existing to keep finished frames, or --overwrite to replace them";
+            return Err(Error::output(path, message).into());
+        }
+        return Ok(Vec::new());
+    }
+    // Each file is read in full: thousands of them take their time. A pair is there if both of it are.
+    let check_all = |&number: &i64| match interrupt.stop_requested() {
+        Some(signal) => Err(Error::Interrupted { signal }),
+        None => Ok(pictures_of(number, settings).map(|id| check(folder, id, hash, settings)).collect()),
+    };
+    let found: Vec<Vec<Found>> = frames.par_iter().map(check_all).collect::<buzz::Result<_>>()?;
+    let stale: Vec<(&PathBuf, &String)> = found
+        .iter()
+        .flatten()
+        .filter_map(|found| match found {
+            Found::Stale(path, reason) => Some((path, reason)),
+            _ => None,
+        })
+        .collect();
+    if let Some((path, reason)) = stale.first() {
+        let others = match stale.len() - 1 {
+            0 => String::new(),
+            others => format!(", and {others} more files too"),
+        };
+        say::line(format_args!("{}: {reason}: it is rendered again{others}", path.display()));
+    }
+    let whole = |frame: Vec<Found>| frame.into_iter().map(Found::record).collect::<Option<Vec<_>>>();
+    let kept: Vec<_> = found.into_iter().filter_map(whole).collect();
+    if !kept.is_empty() {
+        say::line(format_args!("{} of {} frames are there already and stay", kept.len(), frames.len()));
+    }
+    Ok(kept.into_iter().flatten().collect())
+}
+
+/// What stands under the name of a picture.
+enum Found {
+    Nothing,
+    Stale(PathBuf, String),
+    Whole(FrameRecord),
+}
+
+impl Found {
+    fn record(self) -> Option<FrameRecord> {
+        match self {
+            Self::Whole(record) => Some(record),
+            Self::Nothing | Self::Stale(..) => None,
+        }
+    }
+}
+
+fn check(folder: &OutputFolder, id: FrameId, hash: &SettingsHash, settings: &Settings) -> Found {
+    let stale = |reason: String| Found::Stale(folder.file_of(id), reason);
+    match folder.check(id, hash) {
+        FrameFile::Missing => Found::Nothing,
+        FrameFile::Stale(reason) => stale(reason),
+        FrameFile::Complete(stats, _) if settings.audit && stats.hidden.is_none() => {
+            stale("it was not audited".into())
+        }
+        FrameFile::Complete(stats, kind) => Found::Whole(FrameRecord { id, kind, stats, skipped: true }),
+    }
+}
+
+/// Finds out before the rendering, not after it, that the report cannot be written.
+pub fn prepare_report(path: &Path) -> Result<()> {
+    if path.extension().is_none_or(|e| e != "json") {
+        let message =
+            format!("--report {}: expected a .json file; a page is written beside it", path.display());
+        return Err(Error::Usage(message).into());
+    }
+    for file in [path.to_path_buf(), path.with_extension("html")] {
+        if file.is_dir() {
+            let message =
+                "is a folder, where the report is to be; move it away, or give --report another name";
+            return Err(Error::output(file, message).into());
+        }
+    }
+    let (folder, _) = place_of(path);
+    let made = std::fs::create_dir_all(folder).and_then(|()| tempfile::tempfile_in(folder));
+    made.map_err(|e| Error::output(path, format!("the report cannot be written there ({e})")))?;
+    Ok(())
+}
+
+/// An error if the report would replace one of the files that the run reads.
+pub fn refuse_input<'a>(path: &Path, mut inputs: impl Iterator<Item = &'a PathBuf>) -> Result<()> {
+    let whole = |path: &Path| path.canonicalize().ok();
+    let own = whole(path);
+    let is_own = |input: &&PathBuf| own.is_some() && whole(input) == own;
+    match inputs.find(is_own) {
+        Some(input) => {
+            let message =
+                format!("--report {}: it is read by this run; give it another name", input.display());
+            Err(Error::Usage(message).into())
+        }
+        None => Ok(()),
+    }
+}
+
+/// An error if something stands at `path` that would be lost: a report of a file of another name than `input`, or JSON that is no
+/// report. What is not even whole is nobody's.
+pub fn refuse_report_of_another(path: &Path, input: &Path) -> Result<()> {
+    let Some(report) = Report::read(path) else {
+        let bytes = std::fs::read(path).unwrap_or_default();
+        if serde_json::from_slice::<serde_json::Value>(&bytes).is_err() {
+            return Ok(());
+        }
+        let message =
+            "is no report of this program; give --report another name, or --overwrite to replace it";
+        return Err(Error::output(path, message).into());
+    };
+    if Path::new(&report.input).file_name() == input.file_name() {
+        return Ok(());
+    }
+    let message = format!(
+        "is the report of {}; choose another folder, give --report to keep both, or --overwrite to replace it",
+        report.input
+    );
+    Err(Error::output(path, message).into())
+}
+
+/// The folder of a file, and its name in it.
+pub fn place_of(path: &Path) -> (&Path, String) {
+    let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    (folder, path.file_name().unwrap_or_default().to_string_lossy().into_owned())
+}
