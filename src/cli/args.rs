@@ -12,7 +12,7 @@ use std::path::PathBuf;
     args_conflicts_with_subcommands = true,
     subcommand_negates_reqs = true,
     after_help = "Exit status: 0 done, 1 a frame failed, 2 usage, 3 input missing, invalid or unsupported, \
-                  4 output not writable, 130/143 interrupted (finished frames are whole).\n\
+                  4 output not writable, in use or there already, 130/143 interrupted (finished frames are whole).\n\
                   Example: buzz-convert anim.gltf out/ -r 1920x1080 -f 1-100"
 )]
 pub struct Cli {
@@ -224,7 +224,7 @@ pub struct OutputArgs {
     /// Replay a plan that plan --format json has printed.
     #[arg(long, value_name = "FILE", conflicts_with = "segment")]
     pub plan: Option<PathBuf>,
-    /// Refuse to render if the estimate of the memory it takes is over this: 2GiB.
+    /// Refuse to render if the estimate of the memory it takes is over this: 2GiB (a number alone is bytes). [default: what the machine has]
     #[arg(long, value_name = "SIZE")]
     pub memory: Option<String>,
     /// How to show progress.

@@ -31,6 +31,11 @@ pub fn run(args: ConvertArgs) -> Result<ExitCode> {
     let (Some(input), Some(out_dir)) = (&args.input, &args.out_dir) else {
         return Err(Error::Usage("INPUT and OUT_DIR are missing".into()).into());
     };
+    if input.extension().is_none() && !input.exists() {
+        let message =
+            "there is no such file, nor such a command; commands are plan, inspect, compare and trade";
+        return Err(Error::input(input, "file", message).into());
+    }
     let interrupt = Interrupt::watch(ADVICE).context("signals cannot be watched")?;
     let names =
         NamePattern::parse(args.output.name.as_deref().unwrap_or(NamePattern::DEFAULT), &stem(input))?;

@@ -33,15 +33,15 @@ pub fn refuse_over(allowed: Option<u64>, job: &Job) -> Result<()> {
         return Ok(());
     }
     let mebibytes = |bytes: u64| bytes.div_ceil(1 << 20);
+    let limit = if limit < 1 << 20 { format!("{limit} bytes") } else { format!("{} MiB", limit >> 20) };
     let (whose, more) = match allowed {
         Some(_) => ("allowed", "allow more, or"),
         None => ("that there are", "give --memory to try all the same, or"),
     };
     let message = format!(
-        "--memory: rendering is estimated to take {} MiB ({} MiB of them for the scene), over the {} MiB {whose}; {more} lower --resolution, --aa, --aov or --threads",
+        "--memory: rendering is estimated to take {} MiB ({} MiB of them for the scene), over the {limit} {whose}; {more} lower --resolution, --aa, --aov or --threads",
         mebibytes(estimate),
-        mebibytes(held),
-        limit >> 20
+        mebibytes(held)
     );
     Err(Error::Usage(message).into())
 }

@@ -107,7 +107,13 @@ const MOST_PIXELS_A_SIDE: u32 = 65_536;
 
 /// `1920x1080`, or `50%` of `own`.
 pub fn resolution(text: &str, own: (u32, u32)) -> Result<(u32, u32)> {
-    let error = || usage("--resolution", text, "a size like 1920x1080, or a share like 50%");
+    let error = || {
+        usage(
+            "--resolution",
+            text,
+            "a size like 1920x1080, sides up to 65536 and fewer than 2^32 pixels, or a share like 50%",
+        )
+    };
     let size = if let Some(percent) = text.strip_suffix('%') {
         let share = percent.trim().parse::<f64>().map_err(|_| error())? / 100.0;
         let side = |s: u32| (f64::from(s) * share).round() as u32;

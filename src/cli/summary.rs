@@ -51,7 +51,11 @@ pub fn report(
 /// Three lines: frames, rays saved, where the time went.
 pub fn summary(report: &Report) -> String {
     let totals = &report.totals;
-    let frames = if totals.frames == 1 { "frame" } else { "frames" };
+    let frames = match (totals.frames, report.frames.iter().any(|f| f.eye.is_some())) {
+        (1, false) => "frame",
+        (_, false) => "frames",
+        (_, true) => "pictures of two eyes",
+    };
     let mut tally = Tally::default();
     for frame in &report.frames {
         tally.add(frame.from.map_or(FrameKind::Traced, |from| FrameKind::Inferred { from }), frame.rays);

@@ -50,7 +50,7 @@ impl Document {
         let json = json.strip_prefix(b"\xef\xbb\xbf").unwrap_or(json);
         let root: Value = serde_json::from_slice(json).map_err(|e| {
             let place = format!("line {} column {}", e.line(), e.column());
-            Error::input(file, place, format!("not valid JSON ({e}); is this a glTF file?"))
+            Error::input(file, place, format!("not valid JSON ({e}); is this a glTF file? Blender and USD files are exported first (docs/pipeline.md)"))
         })?;
         let binary = binary.map(|bytes| Rc::new(bytes.to_vec()));
         let document = Self { file: file.to_owned(), folder, root, binary, bytes: size };

@@ -85,7 +85,7 @@ fn chunks_and_resumed_runs_give_the_same_bytes() {
     fs::remove_file(parts.join("courtyard.right.0002.exr")).unwrap();
     fs::write(parts.join("courtyard.left.0005.exr"), "cut off").unwrap();
     let resumed = run(&courtyard(), &parts, &format!("{SMALL} {PAIR} --skip-existing")).ok();
-    assert!(resumed.out.starts_with("12 frames"), "{}", resumed.out);
+    assert!(resumed.out.starts_with("12 pictures of two eyes"), "{}", resumed.out);
     assert_eq!(assert_same_bytes(&parts, &out), 12);
     let report = json(&parts.join("report.1-6.json"));
     let again: Vec<_> =

@@ -57,7 +57,7 @@ impl Report {
         };
         let bars: String = self.frames.iter().enumerate().map(|(i, frame)| bar(i, frame)).collect();
         let note = format!(
-            "Key frames are tall, inferred ones low, frames that were there already pale. {}",
+            "Key frames are tall, inferred ones low, frames that were there already pale, the first after a cut framed. {}",
             self.reasons()
         );
         self.chart("Timeline", &note, 40.0, &bars)
@@ -66,7 +66,7 @@ impl Report {
     /// Why there are key frames among the frames of the run: how many for each reason.
     fn reasons(&self) -> String {
         let explained = [
-            ("first", "at the start"),
+            ("first", "for the first segment"),
             ("cut", "after a cut"),
             ("cost", "where inferring would have cost more than tracing"),
             ("length", "where samples had been carried on far enough"),
@@ -86,9 +86,9 @@ impl Report {
         let made = match frame.from {
             Some(_) if frame.eye == Some(StereoEye::Right) => "inferred from left".into(),
             Some(from) => format!("inferred from {from}"),
-            None => match self.plan.keyframes.iter().find(|key| key.frame == frame.frame) {
-                Some(key) => format!("key frame ({})", key.reason),
-                None => "traced".into(),
+            None => match self.plan.keyframes.binary_search_by_key(&frame.frame, |key| key.frame) {
+                Ok(at) => format!("key frame ({})", self.plan.keyframes[at].reason),
+                Err(_) => "traced".into(),
             },
         };
         let share = match (frame.from, frame.predicted_traced) {

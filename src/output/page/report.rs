@@ -58,11 +58,15 @@ impl Report {
             (
                 "Settings",
                 format!(
-                    "quality {}, {}×{}, {fps} frames/s, {} threads, anti-aliasing {}",
+                    "quality {}, {}×{}, {fps} frames/s, {}, anti-aliasing {}",
                     escaped(&settings.quality),
                     settings.width,
                     settings.height,
-                    settings.threads,
+                    if settings.threads == 1 {
+                        "1 thread".into()
+                    } else {
+                        format!("{} threads", settings.threads)
+                    },
                     settings.aa
                 ),
             ),
@@ -213,7 +217,7 @@ mod tests {
         assert!(page.contains("&lt;a &amp; &quot;b&quot;&gt;.gltf"));
         assert!(page.contains("clearcoat &lt;ignored&gt;"));
         assert!(page.contains("Frame 1: key frame (first)") && page.contains("Frame 2: inferred from 1"));
-        assert!(page.contains("Key frames: 1 at the start (first)."));
+        assert!(page.contains("Key frames: 1 for the first segment (first)."));
         assert!(page.contains("missed 25.00 %"));
         for absent in ["http:", "https:", "src=\"/", "NaN", "inf\""] {
             assert!(!page.contains(absent), "{absent}");

@@ -21,7 +21,11 @@ impl Report {
                 "Beauty, exposed so that the brightest percent of the sequence is nearly white",
                 Some(&first.beauty),
             ),
-            ("class", "Class of each pixel, in the colours of the chart below", first.class.as_ref()),
+            (
+                "class",
+                "Class of each pixel: blue is reused; red missed, green an edge, purple entering, orange hidden, pink moved, grey traced",
+                first.class.as_ref(),
+            ),
             ("depth", "Depth of each frame, near is light", first.depth.as_ref()),
         ];
         let figure = |(layer, caption, source): (&str, &str, Option<&String>)| {
