@@ -159,7 +159,7 @@ pub struct Frame {
     pub class: Vec<u8>,
     /// World shading normal turned to the eye, background 0.
     pub normal: Vec<[f32; 3]>,
-    /// World position, background 0.
+    /// World position, metres; background 0.
     pub position: Vec<[f32; 3]>,
     /// Pixels to where the point is in the next frame, x right, y up.
     pub forward: Vec<[f32; 2]>,

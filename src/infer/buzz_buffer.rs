@@ -288,7 +288,7 @@ pub trait CastRays: Sync {
     /// The sample that the ray through the centre of pixel (x, y) finds; sets `lit`, counts what it casts.
     fn cast(&self, x: usize, y: usize, lit: &mut [u32], counts: &mut RayCounts) -> SurfaceSample;
 
-    /// Visits, in any order, the corners, relative to the origin, of triangles that open to the eye between `old` and the
+    /// Visits, in any order, the corners (metres, relative to the segment's origin) of triangles that open to the eye between `old` and the
     /// view that rays are cast for: whose visible side the old view saw as a line, or not at all.
     fn turned(&self, old: &View, visit: &(dyn Fn([Vec3; 3]) + Sync)) {
         let _ = (old, visit);

@@ -21,7 +21,7 @@ use rayon::prelude::*;
 /// on an image of a thousand.
 const STILL: f64 = 1e-6;
 
-/// Marks the contested area for new objects that are at planar depth `k` or farther.
+/// Marks the contested area for new objects that are at planar depth `k` (metres) or farther.
 ///
 /// A pixel is known if the point at depth k on its centre ray lies in the old viewing volume. That point's old raster
 /// position is a homography of the new one, so each row's known pixels are one span; together they are the paper's

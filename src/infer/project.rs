@@ -47,7 +47,7 @@ impl Landings {
         self.0[pixel].fetch_min(landing, Relaxed) != EMPTY
     }
 
-    /// Depth of what landed on the pixel; none where nothing did.
+    /// Planar depth of what landed on the pixel, metres; none where nothing did.
     pub fn z(&self, pixel: usize) -> Option<f32> {
         let landing = self.0[pixel].load(Relaxed);
         (landing != EMPTY).then(|| f32::from_bits((landing >> 32) as u32))

@@ -18,7 +18,7 @@ pub struct Voxels {
 }
 
 impl Voxels {
-    /// Marks the voxels of `triangles`, which may be anywhere; those that are not finite are left out. `slack` says how
+    /// Marks the voxels of `triangles` (metres, relative to the segment's origin), which may be anywhere; those that are not finite are left out. `slack` says how
     /// far around a point its voxels are marked too, metres.
     pub fn new(triangles: impl Iterator<Item = [Vec3; 3]> + Clone, slack: impl Fn(Vec3) -> f32) -> Self {
         let around = |corners: [Vec3; 3]| {
@@ -85,7 +85,7 @@ impl Voxels {
         self.bits.is_empty()
     }
 
-    /// Corners of the grid; none where nothing is marked.
+    /// Lowest and highest corner of the grid, as triangles are given; none where nothing is marked.
     pub fn bounds(&self) -> Option<(Vec3, Vec3)> {
         (!self.is_empty()).then_some((self.min, self.max))
     }
