@@ -58,7 +58,8 @@ pub fn run(args: ConvertArgs) -> Result<ExitCode> {
     let mut warnings = Warnings::default();
 
     interrupt.writing();
-    if args.output.report.is_some() {
+    let is_elsewhere = args.output.report.is_some();
+    if is_elsewhere {
         prepare_report(&report_path)?;
     }
     let pictures = frames.iter().flat_map(|&f| pictures_of(f, &job.settings));
@@ -67,7 +68,10 @@ pub fn run(args: ConvertArgs) -> Result<ExitCode> {
         let path = folder.path().display();
         warnings.add(format!("{path}: the file system has no locks: do not run twice on the same frames"));
     }
-    prepare_report(&report_path)?;
+    // In the output folder: which had to be made first.
+    if !is_elsewhere {
+        prepare_report(&report_path)?;
+    }
     let inputs = [Some(input), args.output.plan.as_ref(), args.scene.camera_from.as_ref()];
     refuse_input(&report_path, inputs.into_iter().flatten().chain(&args.scene.geometry))?;
     if !args.output.overwrite {

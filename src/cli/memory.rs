@@ -60,7 +60,7 @@ pub fn refuse_planning_over(allowed: Option<u64>, job: &Job) -> Result<()> {
         return Ok(());
     }
     let message = format!(
-        "--memory: to plan {frames} frames is estimated to take {} MiB, over {} MiB; render the shot in parts (extras.buzz frame_start and frame_end), or give a lower --fps or --segment",
+        "to plan {frames} frames is estimated to take {} MiB, over the {} MiB that there are or that --memory allows; render the shot in parts (extras.buzz frame_start and frame_end), or give a lower --fps or --segment",
         estimate.div_ceil(1 << 20),
         limit >> 20
     );

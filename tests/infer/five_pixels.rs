@@ -163,10 +163,15 @@ fn a_pure_rotation_contests_nothing() {
     assert!(new.class.iter().all(|c| matches!(c, Good | Overlapped | Missed)), "{:?}", new.class);
 }
 
+/// What five pixels see where there is nothing.
+fn sky() -> Vec<SurfaceSample> {
+    let direction = |i: u8| Vec3::new(f32::from(i) - 2.0, 0.0, -1.0).normalize();
+    (0..5).map(|i| SurfaceSample::background(direction(i))).collect()
+}
+
 #[test]
 fn the_background_keeps_its_direction() {
-    let sky: Vec<_> =
-        (0..5).map(|i| SurfaceSample::background(Vec3::new(i as f32 - 2.0, 0.0, -1.0).normalize())).collect();
+    let sky = sky();
     let (new, rays) = infer(&sky, &five(0.0), &five(0.0));
     assert_eq!((new.class, rays.primary), (vec![Good; 5], 0));
     // Turned by less than half a pixel, each direction is still in its pixel.
@@ -176,8 +181,7 @@ fn the_background_keeps_its_direction() {
 
 #[test]
 fn before_a_sky_alone_anything_may_come_in() {
-    let sky: Vec<_> =
-        (0..5).map(|i| SurfaceSample::background(Vec3::new(i as f32 - 2.0, 0.0, -1.0).normalize())).collect();
+    let sky = sky();
     let (new, rays) = infer(&sky, &five(0.0), &five(30.0));
     assert_eq!((new.class, rays.primary), (vec![Entering; 5], 5));
 }

@@ -64,7 +64,7 @@ impl Review<'_> {
     fn base(&self, report: &Path) -> Result<String> {
         let whole = |path: &Path| path.canonicalize().map_err(|e| super::write::explain(path, &e));
         let frames = whole(self.folder)?;
-        let beside = report.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
+        let beside = super::write::folder_of(report);
         Ok(if whole(beside)? == frames { "../".into() } else { format!("{}/", frames.display()) })
     }
 
