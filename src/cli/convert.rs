@@ -45,10 +45,10 @@ pub fn run(args: ConvertArgs) -> Result<ExitCode> {
         return Ok(ExitCode::SUCCESS);
     }
     let replayed = args.output.plan.as_deref().map(PlanFile::read).transpose()?;
-    let mut job = Job::new(input, &args.scene, &args.image.render, args.image.quality)?;
+    let memory_limit = args.output.memory.as_deref().map(parse::memory).transpose()?;
+    let mut job = Job::new(input, &args.scene, &args.image.render, args.image.quality, memory_limit)?;
     warn_of_ignored(&job.scene);
     choose_image(&mut job, &args)?;
-    let memory_limit = args.output.memory.as_deref().map(parse::memory).transpose()?;
     let timing = job.scene.timing;
     let frames = asked.unwrap_or_else(|| (timing.first..=timing.last).collect());
 

@@ -12,7 +12,7 @@ use serde_json::{Value, json};
 use std::process::ExitCode;
 
 pub fn run(args: InspectArgs) -> Result<ExitCode> {
-    let scene = job::read(&args.input, &args.scene)?;
+    let scene = job::read(&args.input, &args.scene, None)?;
     say::result(&match args.format {
         Format::Json => serde_json::to_string_pretty(&as_json(&scene))? + "\n",
         Format::Text => as_text(&scene),

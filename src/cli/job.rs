@@ -7,6 +7,7 @@ use anyhow::{Context, Result};
 use buzz::accel::Accel;
 use buzz::error::Error;
 use buzz::import::{ImportOptions, import};
+use buzz::output::most_bytes;
 use buzz::plan::{PathFrame, Plan, PlanOptions, plan, replay};
 use buzz::scene::{Ignored, Scene};
 use buzz::sequence::{Observer, Quality, Settings, camera_path};
@@ -27,17 +28,18 @@ pub struct Job {
 }
 
 impl Job {
-    /// Reads the scene and resolves the options.
+    /// Reads the scene and resolves the options. Refuses pictures that take more than so many bytes of memory, or than the machine has.
     pub fn new(
         input: &Path,
         scene_args: &SceneArgs,
         render: &RenderArgs,
         quality: QualityArg,
+        memory: Option<u64>,
     ) -> Result<Self> {
         let threads = use_threads(render.threads)?;
         let longest_segment = parse::segment(&render.segment)?;
         let start = Instant::now();
-        let mut scene = read(input, scene_args)?;
+        let mut scene = read(input, scene_args, memory)?;
         let import_seconds = start.elapsed().as_secs_f64();
         require_camera(&scene, input)?;
         if let Some(first) = scene_args.start_frame {
@@ -102,13 +104,14 @@ impl Job {
     }
 }
 
-/// Reads the scene and warns of what it will not show.
-pub fn read(input: &Path, args: &SceneArgs) -> Result<Scene> {
+/// Reads the scene. Refuses pictures that take more than so many bytes of memory, or than the machine has.
+pub fn read(input: &Path, args: &SceneArgs, memory: Option<u64>) -> Result<Scene> {
     let options = ImportOptions {
         fps: args.fps.as_deref().map(parse::fps).transpose()?,
         geometry: args.geometry.clone(),
         camera_from: args.camera_from.clone(),
         turntable: args.turntable,
+        picture_bytes: memory.or_else(most_bytes),
         strict: args.strict,
     };
     Ok(import(input, &options)?)

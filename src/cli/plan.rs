@@ -19,7 +19,7 @@ pub fn run(args: PlanArgs) -> Result<ExitCode> {
             format!("{}: a plan takes it only for the tasks of --format openjd", args.convert.join(" "));
         return Err(Error::Usage(message).into());
     }
-    let mut job = Job::new(&args.input, &args.scene, &args.image.render, args.image.quality)?;
+    let mut job = Job::new(&args.input, &args.scene, &args.image.render, args.image.quality, None)?;
     warn_of_ignored(&job.scene);
     memory::refuse_planning_over(None, &job)?;
     let plan = job.plan(args.workers as usize, &Unwatched)?;

@@ -22,7 +22,7 @@ pub const ADVICE: &str =
 pub fn run(args: TradeArgs) -> Result<ExitCode> {
     let interrupt = Interrupt::watch(ADVICE).context("signals cannot be watched")?;
     let wanted = args.frames.as_deref().map(parse::frames).transpose()?;
-    let mut job = Job::new(&args.input, &args.scene, &args.render, QualityArg::Full)?;
+    let mut job = Job::new(&args.input, &args.scene, &args.render, QualityArg::Full, None)?;
     warn_of_ignored(&job.scene);
     prepare_report(&args.out_dir.join("trade.json"))?;
     memory::refuse_planning_over(None, &job)?;

@@ -128,6 +128,13 @@ fn pointer_aim(pointer: &str, element: &Element, targets: &Targets, notes: &Note
         Some(Aim { targets: users.map(|(i, _)| make(i)).collect(), width })
     };
     let camera = |source, make| each(&targets.cameras.sources, source, make, 1);
+    // A file may animate both lenses of a camera, which has one.
+    let has_lens = |source: &str, kind: &str| {
+        let source = source.parse::<usize>().ok();
+        let mut users = targets.cameras.sources.iter().zip(&targets.cameras.items);
+        users.all(|(s, camera)| Some(*s) != source || camera.lens.projection.name() == kind)
+            && matches!(kind, "perspective" | "orthographic")
+    };
     let light = |source, make, width| each(&targets.lights.sources, source, make, width);
     let node = |index: &str| targets.nodes.scene_node.get(index.parse::<usize>().ok()?).copied();
     let aim = match parts.as_slice() {
@@ -135,11 +142,14 @@ fn pointer_aim(pointer: &str, element: &Element, targets: &Targets, notes: &Note
             node(index).map(|node| Aim { targets: vec![Target::Visible(node)], width: 1 })
         }
         ["nodes", index, path] => node(index).and_then(|node| node_aim(path, node, targets)),
-        ["cameras", index, "perspective", "yfov"] => camera(index, Target::CameraYfov),
-        ["cameras", index, "orthographic", "xmag"] => camera(index, Target::CameraXmag),
-        ["cameras", index, "orthographic", "ymag"] => camera(index, Target::CameraYmag),
-        ["cameras", index, "perspective" | "orthographic", "znear"] => camera(index, Target::CameraNear),
-        ["cameras", index, "perspective" | "orthographic", "zfar"] => camera(index, Target::CameraFar),
+        ["cameras", index, kind, property] if has_lens(index, kind) => match (*kind, *property) {
+            ("perspective", "yfov") => camera(index, Target::CameraYfov),
+            ("orthographic", "xmag") => camera(index, Target::CameraXmag),
+            ("orthographic", "ymag") => camera(index, Target::CameraYmag),
+            (_, "znear") => camera(index, Target::CameraNear),
+            (_, "zfar") => camera(index, Target::CameraFar),
+            _ => None,
+        },
         ["cameras", index, "extras", "shift"] => {
             each(&targets.cameras.sources, index, Target::CameraShift, 2)
         }

@@ -6,6 +6,33 @@
 use crate::{Error, Result};
 use std::cell::Cell;
 
+/// Counts what pictures take once they are decoded, which their size says nothing of: flat colour packs a thousand times.
+pub(super) struct Pictures {
+    most: u64,
+    taken: Cell<u64>,
+}
+
+impl Pictures {
+    /// Pictures that may take `most` bytes; where nothing is said, any number.
+    pub fn new(most: Option<u64>) -> Self {
+        Self { most: most.unwrap_or(u64::MAX), taken: Cell::default() }
+    }
+
+    /// Takes a picture of so many pixels, each of `size` bytes, and its smaller levels.
+    pub fn take(&self, pixels: usize, size: usize) -> Result<()> {
+        let bytes = pixels.saturating_mul(size) as u64;
+        self.taken.set(self.taken.get().saturating_add(bytes).saturating_add(bytes / 3));
+        if self.taken.get() <= self.most {
+            return Ok(());
+        }
+        Err(Error::Usage(format!(
+            "--memory: the scene's pictures take at least {} MiB, over the {} MiB that there are or that it allows; make them smaller",
+            self.taken.get().div_ceil(1 << 20),
+            self.most >> 20
+        )))
+    }
+}
+
 /// Bytes that any file may take: the smallest scenes are not worth refusing.
 const FLOOR: usize = 64 << 20;
 /// Bytes of geometry and animation that each byte read may become. An 8-bit triangle strip index becomes 12 bytes;

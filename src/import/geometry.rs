@@ -146,6 +146,7 @@ impl<'a> Geometry<'a> {
                 }
                 (_, "TEXCOORD", Some(set)) => {
                     let values = self.floats(&accessor, &[2], Integers::AsDeclared, picked)?;
+                    self.note_what_is_no_number(&values, "texture coordinates", &accessor);
                     let finite = |v: &[f32; 2]| Vec2::from(v.map(|c| if c.is_finite() { c } else { 0.0 }));
                     if mesh.uvs.len() <= set {
                         mesh.uvs.resize(set + 1, Vec::new());
@@ -159,6 +160,7 @@ impl<'a> Geometry<'a> {
                             == Some("VEC4");
                     let width = if wide { 4 } else { 3 };
                     let values = self.floats(&accessor, &[width], Integers::Normalized, picked)?;
+                    self.note_what_is_no_number(&values, "vertex colours", &accessor);
                     let color = |c: &[f32]| {
                         let part =
                             |i: usize| c.get(i).map_or(1.0, |v| if v.is_finite() { v.max(0.0) } else { 0.0 });
@@ -210,12 +212,19 @@ impl<'a> Geometry<'a> {
                 }
             };
             let values = self.floats(&accessor, &[3], Integers::AsDeclared, picked)?;
+            self.note_what_is_no_number(&values, "morph targets", &accessor);
             *slot = vec3s(&values);
             for v in slot.iter_mut().filter(|v| !v.is_finite()) {
                 *v = Vec3::ZERO;
             }
         }
         Ok(out)
+    }
+
+    fn note_what_is_no_number(&self, values: &[f32], what: &str, accessor: &Element<'a>) {
+        if values.iter().any(|value| !value.is_finite()) {
+            self.notes.add(format!("non-finite {what}"), &accessor.place, "they count as 0");
+        }
     }
 
     /// The numbers of an accessor for the vertices that are kept.

@@ -4,6 +4,7 @@ use super::{
     ImportOptions,
     accessor::{Accessors, Integers},
     animation::{self, Animations, Targets},
+    budget::Pictures,
     buffers::Buffers,
     document::{Document, Element},
     extras::{self, CutEntry, Extras},
@@ -25,7 +26,12 @@ use std::{collections::HashMap, path::Path};
 const LONGEST: i64 = 10_000_000;
 
 /// Reads a `.gltf` or `.glb`; without its meshes unless `geometry`.
-pub(super) fn read(file: &Path, options: &ImportOptions, geometry: bool) -> Result<Scene> {
+pub(super) fn read(
+    file: &Path,
+    options: &ImportOptions,
+    pictures: &Pictures,
+    geometry: bool,
+) -> Result<Scene> {
     let document = Document::read(file)?;
     let notes = Notes::default();
     ignored::check_extensions(&document, &notes)?;
@@ -34,7 +40,7 @@ pub(super) fn read(file: &Path, options: &ImportOptions, geometry: bool) -> Resu
     let mut nodes = nodes::read(&document)?;
     let mut scene = Scene::default();
     if geometry {
-        read_geometry(accessors, &mut nodes, &mut scene, &notes)?;
+        read_geometry(accessors, pictures, &mut nodes, &mut scene, &notes)?;
     }
     let cameras = light_camera::cameras(&document, &nodes, &notes)?;
     let lights = light_camera::lights(&document, &nodes, &notes)?;
@@ -53,7 +59,7 @@ pub(super) fn read(file: &Path, options: &ImportOptions, geometry: bool) -> Resu
         scene.world = World { color: world.color, image: None, rotation: world.rotation };
         if let Some((uri, place)) = world.image {
             scene.world.image = Some(scene.images.len());
-            scene.images.push(image::load_world(&document, &uri, &place)?);
+            scene.images.push(image::load_world(&document, &uri, &place, pictures)?);
         }
     }
     scene.cameras = cameras.items;
@@ -65,7 +71,13 @@ pub(super) fn read(file: &Path, options: &ImportOptions, geometry: bool) -> Resu
 }
 
 /// Meshes, materials, images, skins and instances of the scene to render.
-fn read_geometry(accessors: Accessors, nodes: &mut Nodes, scene: &mut Scene, notes: &Notes) -> Result<()> {
+fn read_geometry(
+    accessors: Accessors,
+    pictures: &Pictures,
+    nodes: &mut Nodes,
+    scene: &mut Scene,
+    notes: &Notes,
+) -> Result<()> {
     let document = accessors.document;
     let mut geometry = Geometry::new(accessors, notes)?;
     let mut primitives: Vec<Primitive> = Vec::new();
@@ -125,12 +137,13 @@ fn read_geometry(accessors: Accessors, nodes: &mut Nodes, scene: &mut Scene, not
             }
         }
     }
-    read_materials(accessors, primitives, scene, notes)
+    read_materials(accessors, pictures, primitives, scene, notes)
 }
 
 /// The materials that the primitives use, with their images; then the meshes.
 fn read_materials(
     accessors: Accessors,
+    pictures: &Pictures,
     primitives: Vec<Primitive>,
     scene: &mut Scene,
     notes: &Notes,
@@ -152,7 +165,7 @@ fn read_materials(
         order.push(primitive.material);
         elements.push(element);
     }
-    let images = Images::load(accessors, notes, &wanted)?;
+    let images = Images::load(accessors, notes, pictures, &wanted)?;
     for element in &elements {
         scene.materials.push(match element {
             Some(element) => material::read(element, &images, notes)?,

@@ -2,6 +2,7 @@
 
 use super::{
     accessor::Accessors,
+    budget::Pictures,
     document::{Document, read_file},
     ignored::Notes,
     uri::{self, Source},
@@ -57,7 +58,15 @@ enum Origin {
 
 impl Images {
     /// Loads the images that are wanted; those that cannot be had are noted and left out.
-    pub fn load(accessors: Accessors, notes: &Notes, wanted: &[(usize, ColorSpace)]) -> Result<Self> {
+    ///
+    /// # Errors
+    /// Once `pictures` has no room for them; before anything is decoded.
+    pub fn load(
+        accessors: Accessors,
+        notes: &Notes,
+        pictures: &Pictures,
+        wanted: &[(usize, ColorSpace)],
+    ) -> Result<Self> {
         let document = accessors.document;
         let mut sources: Vec<usize> = wanted.iter().map(|w| w.0).collect();
         sources.sort_unstable();
@@ -89,7 +98,10 @@ impl Images {
         let mut readable = Vec::new();
         for (source, data) in encoded {
             match check_size(&data, &mut pixels) {
-                Ok(()) => readable.push((source, data)),
+                Ok(count) => {
+                    pictures.take(count, size_of::<[u8; 4]>())?;
+                    readable.push((source, data));
+                }
                 Err(why) => unreadable(notes, source, &why),
             }
         }
@@ -206,8 +218,8 @@ fn encoded_bytes(
     })
 }
 
-/// Checks an image's size by its header, and takes it from the pixels that are left.
-fn check_size(data: &[u8], pixels: &mut usize) -> Result<(), String> {
+/// Checks an image's size by its header, and takes it from the pixels that are left. Returns its pixels.
+fn check_size(data: &[u8], pixels: &mut usize) -> Result<usize, String> {
     let reader = ImageReader::new(Cursor::new(data)).with_guessed_format().map_err(|e| e.to_string())?;
     let format = reader.format();
     let (mut width, mut height) = reader.into_dimensions().map_err(|e| first_line(&e.to_string()))?;
@@ -230,7 +242,7 @@ fn check_size(data: &[u8], pixels: &mut usize) -> Result<(), String> {
     *pixels = pixels
         .checked_sub(count)
         .ok_or_else(|| format!("{width}x{height} pixels are more than its size justifies"))?;
-    Ok(())
+    Ok(count)
 }
 
 /// True if a JPEG's last scan has no end (ITU-T T.81, B.1.1.3): what decoders take is grey from there.
@@ -256,19 +268,30 @@ fn first_line(message: &str) -> String {
     message.lines().next().unwrap_or_default().to_owned()
 }
 
-/// A picture file of an OBJ material; the message says why it cannot be had.
-pub(super) fn load_file(name: &str, data: &[u8], space: ColorSpace) -> Result<Image, String> {
+/// A picture file of an OBJ material; the message says why it cannot be had. An error if `pictures` has no room for it.
+pub(super) fn load_file(
+    name: &str,
+    data: &[u8],
+    space: ColorSpace,
+    pictures: &Pictures,
+) -> Result<Result<Image, String>> {
     let mut pixels = PIXELS_FLOOR.saturating_add(data.len().saturating_mul(PIXELS_PER_BYTE));
-    check_size(data, &mut pixels)?;
-    let image = decode(data)?.into_rgba8();
-    let (width, height) = image.dimensions();
-    Ok(Image::from_rgba8(name, width, height, image.as_raw().as_chunks::<4>().0.to_vec(), space))
+    let count = match check_size(data, &mut pixels) {
+        Ok(count) => count,
+        Err(why) => return Ok(Err(why)),
+    };
+    pictures.take(count, size_of::<[u8; 4]>())?;
+    Ok(decode(data).map(|image| {
+        let image = image.into_rgba8();
+        let (width, height) = image.dimensions();
+        Image::from_rgba8(name, width, height, image.as_raw().as_chunks::<4>().0.to_vec(), space)
+    }))
 }
 
 /// The equirectangular picture of a world: `.hdr` and `.exr` are linear, the others sRGB.
 ///
 /// The artist asked for this picture by name: without it all light would be wrong, so it is an error if missing.
-pub(super) fn load_world(document: &Document, uri: &str, place: &str) -> Result<Image> {
+pub(super) fn load_world(document: &Document, uri: &str, place: &str, pictures: &Pictures) -> Result<Image> {
     let data = match uri::resolve(document, uri, place)? {
         Source::Data(bytes) => bytes,
         Source::File(path) => read_file(&path)?,
@@ -277,7 +300,8 @@ pub(super) fn load_world(document: &Document, uri: &str, place: &str) -> Result<
     let mut pixels = PIXELS_FLOOR.saturating_add(data.len().saturating_mul(PIXELS_PER_BYTE));
     let broken =
         |why: String| document.error(place, format!("the image cannot be read ({why}); save it again"));
-    check_size(&data, &mut pixels).map_err(broken)?;
+    let count = check_size(&data, &mut pixels).map_err(broken)?;
+    pictures.take(count, size_of::<[u8; 4]>())?;
     let image = decode(&data).map_err(broken)?;
     let (width, height) = (image.width(), image.height());
     let name = if uri.starts_with("data:") { "world" } else { uri };

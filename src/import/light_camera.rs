@@ -45,23 +45,23 @@ fn lens(element: &Element, notes: &Notes) -> Result<Lens> {
             element.error("has neither a perspective nor an orthographic lens; export the file again")
         );
     };
-    let positive = |key: &str| -> Result<f64> {
-        let value = values.number(key)?.ok_or_else(|| values.error(format!("`{key}` is missing")))?.abs();
-        if value > 0.0 {
+    let size = |key: &str| -> Result<f64> {
+        let value = values.number(key)?.ok_or_else(|| values.error(format!("`{key}` is missing")))?;
+        if value != 0.0 {
             Ok(value)
         } else {
             Err(values.error(format!("`{key}` must not be 0; set the lens")))
         }
     };
     let projection = if kind == "perspective" {
-        let yfov = positive("yfov")?;
-        if yfov >= std::f64::consts::PI {
-            return Err(values.error(format!("a yfov of {yfov} is not below pi; set the lens")));
+        let yfov = size("yfov")?;
+        if !(0.0..std::f64::consts::PI).contains(&yfov) {
+            return Err(values.error(format!("a yfov of {yfov} is not between 0 and pi; set the lens")));
         }
         Projection::Perspective { yfov }
     } else {
         // Negative magnifications are met in the wild and mean no mirror there.
-        Projection::Orthographic { xmag: positive("xmag")?, ymag: positive("ymag")? }
+        Projection::Orthographic { xmag: size("xmag")?.abs(), ymag: size("ymag")?.abs() }
     };
     let near = values.number("znear")?.unwrap_or(0.0).max(0.0);
     let far = values.number("zfar")?.filter(|far| *far > near).unwrap_or(f64::INFINITY);

@@ -31,6 +31,7 @@ use crate::{
     Error, Result,
     scene::{Rational, Scene, Timing},
 };
+use budget::Pictures;
 use std::path::{Path, PathBuf};
 
 /// How to read a scene.
@@ -44,6 +45,8 @@ pub struct ImportOptions {
     pub camera_from: Option<PathBuf>,
     /// Frames of a camera that orbits the scene and takes the place of the scene's own.
     pub turntable: Option<u32>,
+    /// Bytes that its pictures may take once they are decoded; none for any number.
+    pub picture_bytes: Option<u64>,
     /// Refuse a scene that holds anything that would be ignored.
     pub strict: bool,
 }
@@ -53,12 +56,13 @@ pub struct ImportOptions {
 /// # Errors
 /// [`Error::Input`] if a file is missing, broken, or requires what is not supported; if there is no camera and no
 /// turntable; with [`ImportOptions::strict`], if anything would be ignored. [`Error::Usage`] if options contradict
-/// the kind of file.
+/// the kind of file, or pictures take more than [`ImportOptions::picture_bytes`].
 pub fn import(path: &Path, options: &ImportOptions) -> Result<Scene> {
     let is_obj = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("obj"));
+    let pictures = &Pictures::new(options.picture_bytes);
     let mut scene = match (&options.camera_from, is_obj) {
-        (None, false) => gltf::read(path, options, true)?,
-        (Some(cameras), true) => gltf::read(cameras, options, false)?,
+        (None, false) => gltf::read(path, options, pictures, true)?,
+        (Some(cameras), true) => gltf::read(cameras, options, pictures, false)?,
         (None, true) => {
             let fps = options.fps.unwrap_or(Timing::default().fps);
             Scene { timing: Timing { fps, ..Timing::default() }, ..Scene::default() }
@@ -69,10 +73,10 @@ pub fn import(path: &Path, options: &ImportOptions) -> Result<Scene> {
         }
     };
     if is_obj {
-        obj::add(path, &mut scene)?;
+        obj::add(path, pictures, &mut scene)?;
     }
     for file in &options.geometry {
-        obj::add(file, &mut scene)?;
+        obj::add(file, pictures, &mut scene)?;
     }
     if scene.name.is_empty() {
         scene.name = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();

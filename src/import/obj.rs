@@ -1,6 +1,7 @@
 //! Wavefront OBJ files with their MTL materials, as static geometry.
 
 use super::{
+    budget::Pictures,
     document::read_file,
     image,
     uri::{self, Source},
@@ -15,14 +16,15 @@ use crate::{
 use glam::{Affine2, DAffine3, Vec2, Vec3, Vec4};
 use std::{
     cell::RefCell,
-    collections::HashMap,
+    collections::{HashMap, hash_map::Entry},
     path::{Path, PathBuf},
 };
 
 /// Adds the models of `file` to the scene, under one node of its name.
-pub(super) fn add(file: &Path, scene: &mut Scene) -> Result<()> {
+pub(super) fn add(file: &Path, pictures: &Pictures, scene: &mut Scene) -> Result<()> {
     let bytes = read_file(file)?;
     let folder = uri::folder_of(file)?;
+    let place = Place { file, folder: &folder, pictures };
     check_faces(file, &bytes)?;
     let missing = RefCell::new(Vec::new());
     let options =
@@ -63,7 +65,7 @@ pub(super) fn add(file: &Path, scene: &mut Scene) -> Result<()> {
     let first_material = scene.materials.len();
     let mut images = HashMap::new();
     for material in &materials {
-        let material = convert(material, file, &folder, scene, &mut images);
+        let material = convert(material, &place, scene, &mut images)?;
         scene.materials.push(material);
     }
     let mut default_material = None;
@@ -83,6 +85,7 @@ pub(super) fn add(file: &Path, scene: &mut Scene) -> Result<()> {
             })
         });
         let textured = scene.materials[material].has_textures();
+        note_what_is_no_number(&model.mesh, file, scene);
         if let Some(mesh) = mesh(model, material, textured) {
             object += 1;
             // A node of its own, since objects are named after their nodes.
@@ -155,6 +158,17 @@ fn note(scene: &mut Scene, file: &Path, feature: String, effect: &str) {
     }
 }
 
+fn note_what_is_no_number(mesh: &tobj::Mesh, file: &Path, scene: &mut Scene) {
+    let parts = [
+        (&mesh.positions, "positions", "triangles with such corners are left out"),
+        (&mesh.texcoords, "texture coordinates", "they count as 0"),
+        (&mesh.vertex_color, "vertex colours", "they count as 0"),
+    ];
+    for (_, what, effect) in parts.into_iter().filter(|(values, ..)| values.iter().any(|v| !v.is_finite())) {
+        note(scene, file, format!("non-finite {what}"), effect);
+    }
+}
+
 /// The triangles of a model that are whole; none if there is none.
 fn mesh(model: tobj::Model, material: usize, textured: bool) -> Option<Mesh> {
     let tobj::Mesh { positions, normals, texcoords, vertex_color, indices, .. } = model.mesh;
@@ -198,35 +212,43 @@ fn mesh(model: tobj::Model, material: usize, textured: bool) -> Option<Mesh> {
 /// Images already loaded: by the name in the MTL and whether it is a colour.
 type Loaded = HashMap<(String, bool), Option<usize>>;
 
+/// Where the pictures of a file are, and what they may take.
+struct Place<'a> {
+    file: &'a Path,
+    folder: &'a Path,
+    pictures: &'a Pictures,
+}
+
 /// A Phong material as metallic-roughness.
 fn convert(
     mtl: &tobj::Material,
-    file: &Path,
-    folder: &Path,
+    place: &Place<'_>,
     scene: &mut Scene,
     images: &mut Loaded,
-) -> Material {
-    let mut texture = |name: Option<&str>, space: ColorSpace| -> Option<TextureRef> {
-        let name = name?;
-        let key = (name.to_owned(), matches!(space, ColorSpace::Srgb));
-        let image = *images.entry(key).or_insert_with(|| load(name, space, file, folder, scene));
-        Some(TextureRef {
-            image: image?,
+) -> Result<Material> {
+    let mut texture = |name: Option<&str>, space: ColorSpace| -> Result<Option<TextureRef>> {
+        let Some(name) = name else { return Ok(None) };
+        let image = match images.entry((name.to_owned(), matches!(space, ColorSpace::Srgb))) {
+            Entry::Occupied(known) => *known.get(),
+            Entry::Vacant(new) => *new.insert(load(name, space, place, scene)?),
+        };
+        Ok(image.map(|image| TextureRef {
+            image,
             uv_set: 0,
             transform: Affine2::IDENTITY,
             wrap_u: Wrap::Repeat,
             wrap_v: Wrap::Repeat,
             nearest: false,
-        })
+        }))
     };
     let unknown = |key: &str| mtl.unknown_param.get(key).map(String::as_str);
     let number =
         |key: &str| unknown(key).and_then(|v| v.trim().parse::<f32>().ok()).filter(|v| v.is_finite());
-    let base_color_texture = texture(mtl.diffuse_texture.as_deref(), ColorSpace::Srgb);
-    let emissive_texture = texture(unknown("map_Ke"), ColorSpace::Srgb);
+    let base_color_texture = texture(mtl.diffuse_texture.as_deref(), ColorSpace::Srgb)?;
+    let emissive_texture = texture(unknown("map_Ke"), ColorSpace::Srgb)?;
     let normal_name = unknown("norm").or(mtl.normal_texture.as_deref());
     let normal_texture =
-        texture(normal_name, ColorSpace::Linear).map(|texture| NormalTexture { texture, scale: 1.0 });
+        texture(normal_name, ColorSpace::Linear)?.map(|texture| NormalTexture { texture, scale: 1.0 });
     let color = |c: Option<[f32; 3]>, default: f32| {
         Vec3::from_array(c.unwrap_or([default; 3]).map(|v| if v.is_finite() { v.max(0.0) } else { 0.0 }))
     };
@@ -238,7 +260,7 @@ fn convert(
     // Models 4, 6, 7 and 9 are glass: what is not opaque refracts. The others let through straight on.
     let glass = opacity < 1.0 && matches!(mtl.illumination_model, Some(4 | 6 | 7 | 9));
     let emits = emissive_texture.is_some() && mtl.emissive.is_none();
-    Material {
+    Ok(Material {
         name: mtl.name.clone(),
         base_color: diffuse.extend(if glass { 1.0 } else { opacity }),
         base_color_texture,
@@ -259,27 +281,31 @@ fn convert(
         volume: (glass && ior.is_some())
             .then_some(Volume { attenuation_distance: f32::INFINITY, attenuation_color: Vec3::ONE }),
         ..Material::default()
-    }
+    })
 }
 
 /// Loads a picture; none, and noted, if it cannot be had.
-fn load(name: &str, space: ColorSpace, file: &Path, folder: &Path, scene: &mut Scene) -> Option<usize> {
+fn load(name: &str, space: ColorSpace, place: &Place<'_>, scene: &mut Scene) -> Result<Option<usize>> {
     // Options (`-s 1 1 1 wood.png`) stand before the name.
     let path =
         if name.starts_with('-') { name.rsplit(char::is_whitespace).next().unwrap_or(name) } else { name };
-    let data = match uri::in_folder(folder, path) {
+    let data = match uri::in_folder(place.folder, path) {
         Ok(Source::File(path)) => read_file(&path).map_err(|_| "it cannot be read".to_owned()),
         Ok(_) => Err("it is missing".to_owned()),
         Err(why) => Err(why),
     };
-    match data.and_then(|data| image::load_file(path, &data, space)) {
+    let image = match data {
+        Ok(data) => image::load_file(path, &data, space, place.pictures)?,
+        Err(why) => Err(why),
+    };
+    Ok(match image {
         Ok(image) => {
             scene.images.push(image);
             Some(scene.images.len() - 1)
         }
         Err(why) => {
-            note(scene, file, format!("image {path}: {why}"), "its material has its colour alone");
+            note(scene, place.file, format!("image {path}: {why}"), "its material has its colour alone");
             None
         }
-    }
+    })
 }

@@ -12,6 +12,28 @@ pub struct OutputFolder {
     path: PathBuf,
     names: NamePattern,
     lock: FrameLock,
+    // Dropped last: the lock's file is in it.
+    _made: Made,
+}
+
+/// The folders that had to be made, the deepest first. Those in which nothing was written are removed again.
+#[derive(Debug)]
+struct Made(Vec<PathBuf>);
+
+impl Made {
+    fn make(path: &Path) -> Result<Self> {
+        let missing = path.ancestors().take_while(|p| !p.as_os_str().is_empty() && !p.exists());
+        let made = Self(missing.map(Path::to_path_buf).collect());
+        std::fs::create_dir_all(path).map_err(|e| explain(path, &e))?;
+        Ok(made)
+    }
+}
+
+impl Drop for Made {
+    fn drop(&mut self) {
+        // What is not empty cannot be removed, and is to stay.
+        let _ = self.0.iter().try_for_each(std::fs::remove_dir);
+    }
 }
 
 impl OutputFolder {
@@ -21,11 +43,11 @@ impl OutputFolder {
     /// # Errors
     /// [`crate::Error::Output`] if the folder cannot be made or written, or another run is writing one of the frames.
     pub fn open(path: &Path, names: NamePattern, frames: impl IntoIterator<Item = FrameId>) -> Result<Self> {
-        std::fs::create_dir_all(path).map_err(|e| explain(path, &e))?;
+        let made = Made::make(path)?;
         let files: Vec<String> = frames.into_iter().map(|id| names.file_of(id)).collect();
         let lock = FrameLock::acquire(path, &files)?;
         remove_leftovers(path, &files.into_iter().collect())?;
-        Ok(Self { path: path.to_path_buf(), names, lock })
+        Ok(Self { path: path.to_path_buf(), names, lock, _made: made })
     }
 
     /// The folder.

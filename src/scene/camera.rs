@@ -45,6 +45,16 @@ pub enum Projection {
     },
 }
 
+impl Projection {
+    /// glTF's name of its kind.
+    pub fn name(&self) -> &'static str {
+        match self {
+            Self::Perspective { .. } => "perspective",
+            Self::Orthographic { .. } => "orthographic",
+        }
+    }
+}
+
 impl Lens {
     /// Sets the field of view of a perspective lens.
     pub fn set_yfov(&mut self, value: f64) {

@@ -410,6 +410,8 @@ fn an_image_that_no_memory_can_hold_is_refused_before_it_is_rendered() {
     let (folder, out) = fresh();
     let scene = Stage::drifting(2).write(&folder.path().join("s.gltf"));
     // Even where everything else is shared, a pixel takes a hundred bytes.
-    run(&scene, &out, "-r 65536x60000 --progress none").refused(2, &["--memory", "MiB", "--resolution"]);
-    assert_eq!(frames_in(&out), [""; 0]);
+    let deep = out.join("shot 1").join("v2");
+    run(&scene, &deep, "-r 65536x60000 --progress none").refused(2, &["--memory", "MiB", "--resolution"]);
+    // Not even the folders that were made for it remain.
+    assert!(!out.exists());
 }

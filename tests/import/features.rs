@@ -457,6 +457,26 @@ fn triangles_with_non_finite_corners_are_left_out_and_listed() {
 }
 
 #[test]
+fn what_is_no_number_is_listed() {
+    let nan = f32::NAN;
+    let mut gltf = Gltf::with_triangle();
+    let uvs = gltf.floats("VEC2", &[0.0, 0.0, nan, 0.0, 0.0, 1.0]);
+    let colors = gltf.floats("VEC3", &[1.0, 1.0, 1.0, 1.0, f32::INFINITY, 1.0, 0.0, 0.0, 0.0]);
+    let moved = gltf.floats("VEC3", &[0.0, 0.0, 0.0, nan, 0.0, 0.0, 0.0, 0.0, 0.0]);
+    let primitive = &mut gltf.json["meshes"][0]["primitives"][0];
+    primitive["attributes"]["TEXCOORD_0"] = json!(uvs);
+    primitive["attributes"]["COLOR_0"] = json!(colors);
+    primitive["targets"] = json!([{"POSITION": moved}]);
+    let scene = gltf.scene();
+    let mut listed = features(&scene);
+    listed.sort_unstable();
+    let kinds = ["non-finite morph targets", "non-finite texture coordinates", "non-finite vertex colours"];
+    assert_eq!(listed, kinds);
+    assert_eq!(scene.meshes[0].colors[1].y, 0.0);
+    assert_eq!(scene.meshes[0].morph_targets[0].positions[1], Vec3::ZERO);
+}
+
+#[test]
 fn an_empty_primitive_draws_nothing() {
     let mut gltf = Gltf::with_triangle();
     gltf.json["accessors"][0]["count"] = json!(0);
@@ -661,6 +681,30 @@ fn one_file_behind_many_images_is_decoded_once() {
 }
 
 #[test]
+fn pictures_that_memory_cannot_hold_are_refused_before_they_are_decoded() {
+    let folder = TempDir::new().unwrap();
+    let at = |name: &str| folder.path().join(name);
+    fs::write(at("wood.png"), png(16, 16)).unwrap();
+    fs::write(at("sky.png"), png(16, 16)).unwrap();
+    fs::write(at("a.gltf"), textured("wood.png").text()).unwrap();
+    let mut sky = Gltf::with_triangle();
+    sky.json["scenes"][0]["extras"] = json!({"buzz": {"world": {"image": "sky.png"}}});
+    fs::write(at("b.gltf"), sky.text()).unwrap();
+    fs::write(at("c.mtl"), "newmtl wood\nmap_Kd wood.png\n").unwrap();
+    fs::write(at("c.obj"), "mtllib c.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl wood\nf 1 2 3\n").unwrap();
+    for name in ["a.gltf", "b.gltf", "c.obj"] {
+        let with = |picture_bytes| {
+            let options = ImportOptions { picture_bytes, turntable: Some(2), ..ImportOptions::default() };
+            import(&at(name), &options)
+        };
+        assert_eq!(with(Some(16 * 16 * 6)).unwrap().images.len(), 1, "{name}");
+        let error = with(Some(16 * 16 * 5)).unwrap_err();
+        assert_eq!(error.exit_code(), 2, "{name}: {error}");
+        assert!(error.to_string().contains("pictures take at least"), "{name}: {error}");
+    }
+}
+
+#[test]
 fn pictures_that_cannot_be_decoded_cost_their_texture_only() {
     let whole = png(16, 16);
     for data in [&whole[..20], &whole[..whole.len() / 2], b"nonsense", b""] {
@@ -714,6 +758,7 @@ fn orthographic_lenses_infinite_far_planes_and_shift_are_read() {
         json!({"type": "fisheye"}),
         json!({"type": "perspective", "perspective": {"yfov": 0}}),
         json!({"type": "perspective", "perspective": {"yfov": 4}}),
+        json!({"type": "perspective", "perspective": {"yfov": -0.5}}),
         json!({"type": "orthographic", "orthographic": {"xmag": 0, "ymag": 1}}),
     ] {
         gltf.json["cameras"][0] = broken;
@@ -986,6 +1031,19 @@ fn a_camera_on_two_nodes_zooms_on_both() {
 }
 
 #[test]
+fn the_lens_that_a_camera_does_not_have_is_not_animated() {
+    let mut gltf = Gltf::new();
+    gltf.pointer("/cameras/0/orthographic/ymag", &[0.0, 1.0], "SCALAR", &[0.5, 1.0]);
+    gltf.pointer("/cameras/0/orthographic/znear", &[0.0, 1.0], "SCALAR", &[0.5, 1.0]);
+    gltf.pointer("/cameras/0/perspective/znear", &[0.0, 1.0], "SCALAR", &[0.5, 1.0]);
+    let scene = gltf.scene();
+    let targets: Vec<Target> = scene.channels.iter().map(|c| c.target).collect();
+    assert_eq!(targets, [Target::CameraNear(0)]);
+    let listed = ["animation of /cameras/*/orthographic/ymag", "animation of /cameras/*/orthographic/znear"];
+    assert_eq!(features(&scene), listed);
+}
+
+#[test]
 fn of_two_animations_of_one_property_the_last_wins_and_is_listed() {
     let mut gltf = Gltf::new();
     for x in [1.0, 2.0] {
@@ -1169,6 +1227,19 @@ fn an_obj_is_rendered_through_another_files_camera() {
     assert!(message.contains("--camera-from") && message.contains("--turntable"));
     let options = ImportOptions { camera_from: Some(at("cam.gltf")), ..ImportOptions::default() };
     assert_eq!(import(&at("cam.gltf"), &options).unwrap_err().exit_code(), 2);
+}
+
+#[test]
+fn what_is_no_number_in_an_obj_is_listed() {
+    let folder = TempDir::new().unwrap();
+    let file = folder.path().join("a.obj");
+    fs::write(&file, OBJ.replace("v 0 1 0", "v nan 1 0").replace("vt 0 1", "vt 0 inf")).unwrap();
+    let scene = import(&file, &ImportOptions { turntable: Some(2), ..ImportOptions::default() }).unwrap();
+    assert_eq!(scene.triangle_count(), 1);
+    let listed = features(&scene);
+    for kind in ["non-finite positions", "non-finite texture coordinates"] {
+        assert!(listed.contains(&kind), "{listed:?}");
+    }
 }
 
 #[test]
