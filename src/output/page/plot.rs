@@ -48,6 +48,7 @@ impl Plot<'_> {
             (right, HEIGHT - BOTTOM - y.share(py) * (HEIGHT - TOP - BOTTOM))
         };
         let mut marks = String::new();
+        let mut names = Vec::new();
         for (i, series) in self.series.iter().enumerate() {
             let (color, dash) = (COLORS[i % COLORS.len()], DASHES[i % DASHES.len()]);
             let points: Vec<(f64, f64)> = series.points.iter().map(at).collect();
@@ -63,13 +64,13 @@ impl Plot<'_> {
                 marks += &mark(i, *px, *py, color, &escaped(&text));
             }
             if let Some((px, py)) = points.last() {
-                marks += &format!(
-                    "<text x=\"{:.1}\" y=\"{:.1}\" style=\"fill:{color}\">{}</text>",
-                    px + 10.0,
-                    py + 4.0,
-                    escaped(&series.name)
-                );
+                names.push(((px + 10.0, py + 4.0), color, &series.name));
             }
+        }
+        set_apart(names.iter_mut().map(|name| &mut name.0).collect());
+        for ((px, py), color, name) in names {
+            let name = escaped(name);
+            marks += &format!("<text x=\"{px:.1}\" y=\"{py:.1}\" style=\"fill:{color}\">{name}</text>");
         }
         let (bottom, right) = (HEIGHT - BOTTOM, WIDTH - RIGHT);
         for (place, name) in &self.marked {
@@ -118,6 +119,17 @@ impl Plot<'_> {
             (TOP + bottom) / 2.0,
             escaped(self.y)
         )
+    }
+}
+
+/// Moves names down that would lie on another.
+fn set_apart(mut places: Vec<&mut (f64, f64)>) {
+    const ROOM: (f64, f64) = (90.0, 14.0);
+    places.sort_by(|a, b| a.1.total_cmp(&b.1));
+    for i in 1..places.len() {
+        let (above, rest) = places.split_at_mut(i);
+        let beside = above.iter().filter(|other| (other.0 - rest[0].0).abs() < ROOM.0);
+        rest[0].1 = beside.map(|other| other.1 + ROOM.1).fold(rest[0].1, f64::max);
     }
 }
 
@@ -187,6 +199,13 @@ mod tests {
         assert!(axis.low <= 0.25 && axis.high > 0.25 && axis.ticks().count() < 10);
         assert!(Axis::over(std::iter::empty()).is_none());
         assert!(Axis::over([0.0].into_iter()).unwrap().high > 0.0);
+    }
+
+    #[test]
+    fn no_name_lies_on_another() {
+        let mut places = [(10.0, 52.0), (300.0, 51.0), (20.0, 50.0), (12.0, 40.0), (15.0, 51.0)];
+        set_apart(places.iter_mut().collect());
+        assert_eq!(places, [(10.0, 82.0), (300.0, 51.0), (20.0, 54.0), (12.0, 40.0), (15.0, 68.0)]);
     }
 
     #[test]
