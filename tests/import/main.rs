@@ -3,8 +3,15 @@
 // Helpers of tests are not tests to clippy; what was found is worth reading.
 #![allow(missing_docs, clippy::unwrap_used, clippy::panic, clippy::print_stdout)]
 
-mod features;
+mod animation;
+mod cameras_lights;
+mod files;
 mod fuzz;
+mod geometry;
 mod gltf_file;
+mod materials;
+mod nodes;
+mod obj;
+mod read;
 mod shapes;
 mod shared;
