@@ -164,3 +164,9 @@ class Gltf:
         for k, target in enumerate(primitive["targets"]):
             points = points + np.interp(t, times, rows[:, k]) * self.accessor(target["POSITION"])
         return points
+
+
+def primitive(gltf, name, number=0):
+    """A primitive of the mesh on a node, and its arrays."""
+    data = gltf.root["meshes"][gltf.root["nodes"][gltf.node(name)]["mesh"]]["primitives"][number]
+    return data, {k: gltf.accessor(i) for k, i in data["attributes"].items()}

@@ -1,0 +1,154 @@
+"""USD materials: preview surfaces, their textures, and what is not carried."""
+
+from __future__ import annotations
+
+import io
+import math
+import zipfile
+
+import numpy as np
+import pytest
+
+pytest.importorskip("pxr", reason="SKIPPED LOUDLY: usd-core is not installed (pip install usd-core)")
+import usd_scene as u
+from gltf_reader import primitive
+from PIL import Image
+from pxr import Gf, Sdf, UsdGeom, UsdUtils
+
+
+def test_preview_surface(usd_convert):
+    made = u.stage()
+    u.camera(made)
+    prim = u.quad(made, "/World/Card")
+    prim.CreateDoubleSidedAttr(True)
+    u.bind(
+        prim,
+        u.preview(
+            made, "/World/M", diffuseColor=(0.1, 0.2, 0.3), metallic=0.5, roughness=0.25, ior=1.8, clearcoat=1.0, emissiveColor=(4.0, 2.0, 0.0), opacity=0.5
+        ),
+    )
+    material = usd_convert(made).root["materials"][0]
+    pbr = material["pbrMetallicRoughness"]
+    assert pbr["baseColorFactor"] == pytest.approx([0.1, 0.2, 0.3, 0.5])
+    assert (pbr["metallicFactor"], pbr["roughnessFactor"]) == (0.5, 0.25)
+    assert (material["alphaMode"], material["doubleSided"]) == ("BLEND", True)
+    assert material["extensions"]["KHR_materials_ior"]["ior"] == pytest.approx(1.8)
+    assert material["extensions"]["KHR_materials_clearcoat"]["clearcoatFactor"] == 1
+    assert material["emissiveFactor"] == [1, 0.5, 0]
+    assert material["extensions"]["KHR_materials_emissive_strength"]["emissiveStrength"] == 4
+
+
+def test_opacity_threshold_is_a_mask(usd_convert):
+    made = u.stage()
+    u.camera(made)
+    prim = u.quad(made, "/World/Card")
+    u.bind(prim, u.preview(made, "/World/M", opacity=0.5, opacityThreshold=0.25))
+    material = usd_convert(made).root["materials"][0]
+    assert (material["alphaMode"], material["alphaCutoff"]) == ("MASK", 0.25)
+
+
+def test_textures_go_into_gltfs_channels(usd_convert, tmp_path):
+    """Metallic from one image's red, roughness from another's alpha: packed into blue and green."""
+    Image.new("RGBA", (2, 2), (51, 0, 0, 255)).save(tmp_path / "metal.png")
+    Image.new("RGBA", (4, 4), (0, 0, 0, 102)).save(tmp_path / "rough.png")
+    made = u.stage()
+    u.camera(made)
+    prim = u.quad(made, "/World/Card")
+    u.uv(prim, [(0, 0), (1, 0), (1, 1), (0, 1)])
+    material = u.preview(made, "/World/M")
+    u.texture(made, material, "metallic", "metal.png", "r")
+    u.texture(made, material, "roughness", "rough.png", "a", wrapS="clamp")
+    u.bind(prim, material)
+    gltf = usd_convert(made)
+    pbr = gltf.root["materials"][0]["pbrMetallicRoughness"]
+    texture = gltf.root["textures"][pbr["metallicRoughnessTexture"]["index"]]
+    image = Image.open(gltf.path.parent / gltf.root["images"][texture["source"]]["uri"])
+    assert image.size == (4, 4)
+    assert image.convert("RGB").getpixel((1, 1))[1:] == (102, 51)
+
+
+def test_texture_transform_turns_over(usd_convert, tmp_path):
+    """UsdTransform2d and KHR_texture_transform send a point to the same texel, v counted from the other end."""
+    from pxr import UsdShade
+
+    Image.new("RGB", (2, 2)).save(tmp_path / "t.png")
+    made = u.stage()
+    u.camera(made)
+    prim = u.quad(made, "/World/Card")
+    u.uv(prim, [(0, 0), (1, 0), (1, 1), (0, 1)])
+    material = u.preview(made, "/World/M")
+    node = u.texture(made, material, "diffuseColor", "t.png")
+    turn = UsdShade.Shader.Define(made, "/World/M/Turn")
+    turn.CreateIdAttr("UsdTransform2d")
+    turn.CreateInput("rotation", Sdf.ValueTypeNames.Float).Set(30.0)
+    turn.CreateInput("scale", Sdf.ValueTypeNames.Float2).Set(Gf.Vec2f(2, 3))
+    turn.CreateInput("translation", Sdf.ValueTypeNames.Float2).Set(Gf.Vec2f(0.25, 0.5))
+    reader = UsdShade.Shader(made.GetPrimAtPath("/World/M/diffuseColorReader"))
+    turn.CreateInput("in", Sdf.ValueTypeNames.Float2).ConnectToSource(reader.ConnectableAPI(), "result")
+    node.GetInput("st").ConnectToSource(turn.ConnectableAPI(), "result")
+    u.bind(prim, material)
+    info = usd_convert(made).root["materials"][0]["pbrMetallicRoughness"]["baseColorTexture"]["extensions"]["KHR_texture_transform"]
+    a = math.radians(30)
+    for s, t in ((0.1, 0.2), (0.7, 0.4)):
+        want = (2 * s * math.cos(a) - 3 * t * math.sin(a) + 0.25, 2 * s * math.sin(a) + 3 * t * math.cos(a) + 0.5)
+        # KHR_texture_transform: offset + rotation * scale * uv, with rotation's columns (cos, -sin), (sin, cos) for v down.
+        r, (x, y) = info["rotation"], (info["scale"][0] * s, info["scale"][1] * (1 - t))
+        got = (info["offset"][0] + math.cos(r) * x + -math.sin(r) * y, info["offset"][1] + math.sin(r) * x + math.cos(r) * y)
+        assert got == (pytest.approx(want[0], abs=1e-6), pytest.approx(1 - want[1], abs=1e-6))
+
+
+def test_usdz_with_textures(usd_convert, tmp_path):
+    Image.new("RGB", (3, 3), (9, 8, 7)).save(tmp_path / "inside.png")
+    made = u.stage()
+    u.camera(made)
+    prim = u.quad(made, "/World/Card")
+    u.uv(prim, [(0, 0), (1, 0), (1, 1), (0, 1)])
+    material = u.preview(made, "/World/M")
+    u.texture(made, material, "diffuseColor", "inside.png")
+    u.bind(prim, material)
+    made.GetRootLayer().Export(str(tmp_path / "s.usda"))
+    assert UsdUtils.CreateNewUsdzPackage(str(tmp_path / "s.usda"), str(tmp_path / "s.usdz"))
+    assert any(n.endswith("inside.png") for n in zipfile.ZipFile(tmp_path / "s.usdz").namelist())
+    (tmp_path / "inside.png").unlink()
+    gltf = usd_convert(tmp_path / "s.usdz", "out.glb")
+    view = gltf.root["bufferViews"][gltf.root["images"][0]["bufferView"]]
+    start = view.get("byteOffset", 0)
+    image = Image.open(io.BytesIO(gltf._binary[start : start + view["byteLength"]]))
+    assert image.getpixel((1, 1)) == (9, 8, 7)
+
+
+def test_what_is_not_carried_is_named(usd_convert):
+    made = u.stage()
+    u.camera(made)
+    made.DefinePrim("/World/Hair", "BasisCurves")
+    made.DefinePrim("/World/Smoke", "Volume")
+    UsdGeom.Mesh.Define(made, "/World/Empty")
+    broken = u.quad(made, "/World/Broken")
+    broken.GetFaceVertexIndicesAttr().Set([0, 1, 2, 99])
+    gltf = usd_convert(made)
+    assert gltf.lost_features("/World/Hair") == ["BasisCurves"]
+    assert gltf.lost_features("/World/Smoke") == ["Volume"]
+    assert gltf.lost_features("/World/Empty") == ["mesh without faces"]
+    assert "damaged mesh" in gltf.lost_features("/World/Broken")[0]
+
+
+def test_display_colour_read_by_a_material(usd_convert):
+    from pxr import UsdShade
+
+    made = u.stage()
+    u.camera(made)
+    prim = u.quad(made, "/World/Card")
+    prim.CreateDisplayColorPrimvar("vertex").Set([(1, 0, 0), (0, 1, 0), (0, 0, 1), (1, 1, 1)])
+    material = u.preview(made, "/World/M", roughness=0.25)
+    reader = UsdShade.Shader.Define(made, "/World/M/Reader")
+    reader.CreateIdAttr("UsdPrimvarReader_float3")
+    reader.CreateInput("varname", Sdf.ValueTypeNames.String).Set("displayColor")
+    surface = UsdShade.Shader(made.GetPrimAtPath("/World/M/Surface"))
+    surface.CreateInput("diffuseColor", Sdf.ValueTypeNames.Color3f).ConnectToSource(reader.ConnectableAPI(), "result")
+    u.bind(prim, material)
+    plain = u.quad(made, "/World/Plain")
+    plain.CreateDisplayColorPrimvar("vertex").Set([(1, 0, 0), (0, 1, 0), (0, 0, 1), (1, 1, 1)])
+    u.bind(plain, u.preview(made, "/World/N"))
+    gltf = usd_convert(made)
+    assert len(np.unique(primitive(gltf, "Card")[1]["COLOR_0"], axis=0)) == 4
+    assert "COLOR_0" not in primitive(gltf, "Plain")[1], "display colours do not tint a material that does not read them"
