@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import math
-import re
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -13,7 +12,7 @@ from urllib.parse import quote
 
 import numpy as np
 import pygltflib
-from pxr import Tf, Usd, UsdGeom, UsdRender, UsdSkel, UsdUtils
+from pxr import Tf, Usd, UsdGeom, UsdRender, UsdSkel
 
 from ..common import extras, motion
 from ..common.document import Document, write_whole
@@ -22,6 +21,7 @@ from .cameras import CameraTrack
 from .lights import DomeTrack, LightTrack, write_dome
 from .materials import Materials
 from .shapes import Geometries
+from .stage import open_stage, reason
 from .textures import Textures
 from .walk import Found, Walker
 
@@ -72,50 +72,7 @@ def convert(source: Path, target: Path, options: Options) -> Result:
         return _Conversion(source, target, options).run()
     except Tf.ErrorException as error:
         # What USD itself refuses, such as an xformOp that does not exist.
-        raise InputError(f"{source}: {_reason(error)}; check the stage with usdchecker") from None
-
-
-def _reason(error: object) -> str:
-    """What an error of USD's says is wrong: its text ends with that, in quotes."""
-    return " ".join(str(error).split()).rsplit(" : ", 1)[-1].strip("' ")
-
-
-def open_stage(source: Path, variants: list[tuple[str, str, str]], lost: Lost) -> Usd.Stage:
-    """Open a stage with variants chosen in its session layer, which is never saved."""
-    if not Path(source).is_file():
-        raise InputError(f"{source}: no such file")
-    # What is missing is taken from GetCompositionErrors(); USD's own stack traces on the terminal help nobody.
-    delegate = UsdUtils.CoalescingDiagnosticDelegate()
-    try:
-        stage = Usd.Stage.Open(str(source))
-    except Tf.ErrorException as error:
-        # The first is the parser's own, which names the line.
-        raise InputError(f"{source}: not a USD stage ({_reason(error.args[0])})") from None
-    finally:
-        delegate.TakeUncoalescedDiagnostics()
-        del delegate
-    stage.SetEditTarget(stage.GetSessionLayer())
-    for path, name, choice in variants:
-        prim = stage.GetPrimAtPath(path) if path else stage.GetDefaultPrim()
-        owners = [prim] if prim and name in prim.GetVariantSets().GetNames() else []
-        if not path:
-            owners = owners or [p for p in stage.Traverse() if name in p.GetVariantSets().GetNames()]
-        if not owners:
-            have = sorted({f"{p.GetPath()}:{n}" for p in stage.Traverse() for n in p.GetVariantSets().GetNames()})
-            raise InputError(
-                f"variant set {name!r}: {path or 'no prim of the stage'} {'has it not' if path else 'has it'}; there are {', '.join(have) or 'none'}"
-            )
-        for owner in owners:
-            have = owner.GetVariantSet(name).GetVariantNames()
-            if choice not in have:
-                raise InputError(f"variant {name}={choice}: {owner.GetPath()} has {', '.join(have)}")
-            owner.GetVariantSet(name).SetVariantSelection(choice)
-    for error in stage.GetCompositionErrors():
-        text = " ".join(str(error).split())
-        where = re.search(r"<([^<>]*)>", str(getattr(error, "rootSite", ""))) or re.search(r"<([^<>]*)>", text)
-        name = where[1] if where else str(source)
-        lost.add(name, f"composition: {text[:200]}", "what it refers to is missing from the picture; check the path")
-    return stage
+        raise InputError(f"{source}: {reason(error)}; check the stage with usdchecker") from None
 
 
 class _Conversion:
