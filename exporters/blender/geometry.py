@@ -17,6 +17,11 @@ from ..common.morph import choose_targets
 from ..common.report import Lost
 from .prepare import is_animated
 
+# Modifiers that may change what of a mesh is not its vertices' positions.
+_CHANGES_ATTRIBUTES = {"NODES", "UV_WARP", "UV_PROJECT", "DATA_TRANSFER"}
+# Other objects that a curve's or a text's own data is shaped by.
+_SHAPED_BY = ("bevel_object", "taper_object", "follow_curve")
+
 
 @dataclass
 class Shape:
@@ -40,10 +45,14 @@ class GeometryStore:
         self._by_content: dict[bytes, int] = {}
         self._by_source: dict[tuple, list[int]] = {}
         self._this_sample: dict[int, int] = {}
+        # What each source has given in this sample: geometry nodes make several meshes of one name.
+        self._meshes_of: dict[tuple, list[int]] = {}
+        self._attributes: dict[int, bytes] = {}
 
     def begin_sample(self) -> None:
         """Forget what was seen in the sample before."""
         self._this_sample = {}
+        self._meshes_of = {}
 
     def shape_of(self, ob: bpy.types.Object, sample: int) -> int:
         """The shape of an evaluated object at a sample; its pose is recorded where it may change."""
@@ -51,6 +60,10 @@ class GeometryStore:
         if pointer in self._this_sample and not _slots_of_object(ob):
             return self._this_sample[pointer]
         source = (ob.original.name_full, ob.data.name)
+        meshes = self._meshes_of.setdefault(source, [])
+        if pointer not in meshes:
+            meshes.append(pointer)
+        source = (*source, meshes.index(pointer))
         known = self._by_source.get(source)
         changing = may_deform(ob)
         if known and not changing:
@@ -68,8 +81,18 @@ class GeometryStore:
                 number = self._new(ob, topology)
                 self._by_source.setdefault(source, []).append(number)
             self.shapes[number].poses[sample] = _positions(ob.data)
+            self._name_what_changes(ob, number)
         self._this_sample[pointer] = number
         return number
+
+    def _name_what_changes(self, ob: bpy.types.Object, number: int) -> None:
+        """Only positions are sampled: name a mesh of which a modifier changes anything else."""
+        if all(modifier.type not in _CHANGES_ATTRIBUTES for modifier in ob.original.modifiers):
+            return
+        attributes = _attributes(ob.data)
+        if self._attributes.setdefault(number, attributes) != attributes:
+            what = "texture coordinates, colours or material slots that change"
+            self.lost.add(ob.name, what, "those of the first frame are used; animate the material or the shape instead")
 
     def _new(self, ob: bpy.types.Object, topology: bytes) -> int:
         # new_from_object() gives the mesh of the instancer for geometry-nodes instances; a copy of the evaluated data does not.
@@ -117,11 +140,12 @@ def may_deform(ob: bpy.types.Object) -> bool:
     """Whether an evaluated object's mesh can differ from frame to frame."""
     source = ob.original
     data = source.data
-    if source.type != "MESH":
-        return source.type == "META" or is_animated(data) or bool(source.modifiers)
-    if source.modifiers or is_animated(data):
+    # A parent of these kinds is a modifier that is in no list.
+    if source.modifiers or source.parent_type in ("ARMATURE", "LATTICE", "CURVE"):
         return True
-    return getattr(data, "shape_keys", None) is not None
+    if source.type == "META" or is_animated(data) or getattr(data, "shape_keys", None) is not None:
+        return True
+    return any(getattr(data, other, None) is not None for other in _SHAPED_BY)
 
 
 def _slots_of_object(ob: bpy.types.Object) -> bool:
@@ -132,6 +156,21 @@ def _positions(mesh: bpy.types.Mesh) -> np.ndarray:
     values = np.empty(len(mesh.vertices) * 3, dtype=np.float32)
     mesh.vertices.foreach_get("co", values)
     return values
+
+
+def _attributes(mesh: bpy.types.Mesh) -> bytes:
+    """A digest of texture coordinates, colours and material slots."""
+    digest = hashlib.blake2b(digest_size=16)
+    layers = [(layer.uv, "vector", 2) for layer in mesh.uv_layers]
+    layers += [(layer.data, "color", 4) for layer in mesh.color_attributes]
+    for data, name, width in layers:
+        values = np.empty(len(data) * width, dtype=np.float32)
+        data.foreach_get(name, values)
+        digest.update(values.tobytes())
+    slots = np.empty(len(mesh.polygons), dtype=np.int32)
+    mesh.polygons.foreach_get("material_index", slots)
+    digest.update(slots.tobytes() + repr([m.name_full if m else "" for m in mesh.materials]).encode())
+    return digest.digest()
 
 
 def _topology(mesh: bpy.types.Mesh) -> bytes:

@@ -24,6 +24,7 @@ from ..common.document import Document
 from ..common.report import ExportError, InputError, Lost, OutputError
 from . import cameras, world
 from .bake import bake_procedural
+from .losses import name_scene_losses
 from .materials import prepare_materials
 from .prepare import prepare
 from .sample import InstanceTrack, Sampler
@@ -88,7 +89,7 @@ class _Export:
     def run(self) -> Result:
         """Do the whole job."""
         prepare(self.scene, self.view_layer)
-        _name_scene_losses(self.scene, self.lost)
+        name_scene_losses(self.scene, self.view_layer, self.lost)
         self.options.progress(f"sampling frames {self.frames[0]}-{self.frames[1]}")
         sampler = Sampler(self.scene, self.view_layer, self.size, self.lost)
         sky: list[tuple[float, ...]] = []
@@ -280,32 +281,3 @@ def _call_exporter(path: Path, separate: bool, textures: str) -> None:
         mesh = re.findall(r"Extracting primitive: (.*)", log.getvalue())
         where = f" at mesh {mesh[-1]!r}" if mesh else ""
         raise ExportError(f"Blender's glTF exporter failed{where}: {last}; hide that object from the render, or simplify it") from None
-
-
-def _name_scene_losses(scene: bpy.types.Scene, lost: Lost) -> None:
-    """Things of the whole scene that a picture made from the glTF will not have."""
-    render = scene.render
-    if render.frame_map_old != render.frame_map_new:
-        lost.add(scene.name, "time stretching", "set Time Stretching back and scale the keys instead")
-    if render.use_motion_blur:
-        lost.add(scene.name, "motion blur", "it is not rendered; use the motion vectors (--aov motion) in compositing")
-    if render.use_border:
-        lost.add(scene.name, "render region", "the whole picture is rendered; pass --crop to buzz-convert")
-    if render.use_multiview:
-        lost.add(scene.name, "stereoscopy", "pass --stereo and --convergence to buzz-convert")
-    if scene.frame_step != 1:
-        lost.add(scene.name, f"frame step {scene.frame_step}", f"pass --frames {scene.frame_start}-{scene.frame_end}x{scene.frame_step} to buzz-convert")
-    for camera in {m.camera for m in scene.timeline_markers if m.camera} | {scene.camera}:
-        if camera is not None and camera.type == "CAMERA" and camera.data.dof.use_dof:
-            lost.add(camera.name, "depth of field", "it is not rendered; use depth.Z in compositing")
-    for ob in scene.objects:
-        if ob.hide_render:
-            continue
-        for flag, label in (("is_holdout", "holdout"), ("is_shadow_catcher", "shadow catcher")):
-            if ob.type == "MESH" and getattr(ob, flag, False):
-                lost.add(ob.name, label, "it is rendered as an ordinary object; use its objectId in compositing")
-        if ob.type == "MESH" and not getattr(ob, "visible_camera", True):
-            lost.add(ob.name, "hidden from camera rays", "it is seen here; hide it from the render or leave it out")
-        for system in ob.particle_systems:
-            if system.settings.type == "HAIR" and system.settings.render_type == "PATH":
-                lost.add(ob.name, "hair", "it is left out; convert it to a mesh first (Object > Convert)")

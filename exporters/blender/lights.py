@@ -31,11 +31,14 @@ class LightTrack:
     poses: list[np.ndarray] = field(default_factory=list)
     values: list[dict[str, float]] = field(default_factory=list)
     visible: list[bool] = field(default_factory=list)
+    stretched: bool = False
 
     def sample(self, data: bpy.types.Light, world: np.ndarray, visible: bool) -> None:
         """Record a light's evaluated data and world matrix."""
+        scale = np.linalg.norm(np.array(world)[:3, :3], axis=0)
+        self.stretched = self.stretched or bool(scale.max() > scale.min() * (1 + 1e-3))
         self.poses.append(view_matrix(world))
-        self.values.append(_values(data, np.linalg.norm(np.array(world)[:3, :3], axis=0)))
+        self.values.append(_values(data, scale))
         self.visible.append(visible)
 
     def hold(self) -> None:
@@ -49,6 +52,8 @@ class LightTrack:
         if not any(self.visible):
             return
         _warn(self.name, self.data, lost)
+        if self.data.type == "SPOT" and self.stretched:
+            lost.add(self.name, "spot with different scales", "its cone is round; apply the scale, or use an area light")
         values = {key: np.array([sample[key] for sample in self.values]) for key in self.values[0]}
         document.use_extension("KHR_lights_punctual")
         lights = document.root.setdefault("extensions", {}).setdefault("KHR_lights_punctual", {}).setdefault("lights", [])
@@ -126,8 +131,9 @@ def _values(data: bpy.types.Light, scale: np.ndarray) -> dict[str, float]:
     out |= {"intensity": max(LUMENS_PER_WATT * power / (4 * math.pi), 0), "radius": data.shadow_soft_size}
     if data.type == "SPOT":
         half = min(data.spot_size / 2, _HALF_PI)
-        # Cycles is at full strength where cos(theta) >= cos(half) + (1 - cos(half)) * blend.
-        inner = math.acos(min(math.cos(half) + (1 - math.cos(half)) * data.spot_blend, 1.0))
+        # Cycles goes smoothly from 0 at cos(half) to 1 over a share `blend` of the cone, glTF by a square from the outer to the
+        # inner cone. Both let the same light through where glTF takes three quarters of that way.
+        inner = math.acos(min(math.cos(half) + (1 - math.cos(half)) * 0.75 * data.spot_blend, 1.0))
         out |= {"inner": min(inner, half - 1e-4) if half > 2e-4 else 0.0, "outer": half}
     return out
 
@@ -153,6 +159,8 @@ def _warn(name: str, data: bpy.types.Light, lost: Lost) -> None:
         lost.add(name, "area light spread", "it shines over the whole half space; use a spot light for a beam")
     if data.type == "SPOT" and data.spot_size > math.pi + 1e-3:
         lost.add(name, "spot wider than 180 degrees", "glTF ends at 180 degrees; use a point light")
+    if data.energy < 0:
+        lost.add(name, "negative light", "it does not shine; darken the material or the picture instead")
     if getattr(data, "use_square", False):
         lost.add(name, "square spot", "its cone is round; use an area light with a smaller surface")
     if not getattr(data, "use_shadow", True):

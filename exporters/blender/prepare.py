@@ -24,11 +24,11 @@ def prepare(scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer) -> None:
             collection.hide_viewport = False
     _show_layers(view_layer.layer_collection)
     for ob in bpy.data.objects:
-        _unmute(ob, "hide_viewport")
+        _still(ob, "hide_viewport")
         ob.hide_viewport = False
         ob.show_instancer_for_viewport = ob.show_instancer_for_render
         for modifier in ob.modifiers:
-            _as_rendered(modifier)
+            _as_rendered(ob, modifier)
         for system in ob.particle_systems:
             _particles(system.settings)
     for ob in view_layer.objects:
@@ -59,24 +59,43 @@ def _show_layers(layer: bpy.types.LayerCollection) -> None:
         _show_layers(child)
 
 
-def _unmute(ob: bpy.types.Object, path: str) -> None:
+def _still(ob: bpy.types.Object, path: str) -> None:
     """Take the animation off a property that is about to be set."""
     data = ob.animation_data
     if data is None:
         return
-    for driver in data.drivers:
+    for driver in list(data.drivers):
         if driver.data_path == path:
-            driver.mute = True
+            data.drivers.remove(driver)
     for curve in action_curves(ob):
         if curve.data_path == path:
             curve.mute = True
 
 
-def _as_rendered(modifier: bpy.types.Modifier) -> None:
-    modifier.show_viewport = modifier.show_render
-    for viewport, render in _LEVELS:
-        if hasattr(modifier, viewport) and hasattr(modifier, render):
-            setattr(modifier, viewport, getattr(modifier, render))
+def _as_rendered(ob: bpy.types.Object, modifier: bpy.types.Modifier) -> None:
+    owner = f'modifiers["{bpy.utils.escape_identifier(modifier.name)}"]'
+    for viewport, render in (("show_viewport", "show_render"), *_LEVELS):
+        if not (hasattr(modifier, viewport) and hasattr(modifier, render)):
+            continue
+        _still(ob, f"{owner}.{viewport}")
+        setattr(modifier, viewport, getattr(modifier, render))
+        if _moves(ob, f"{owner}.{render}"):
+            _follow(modifier, viewport, ob, f"{owner}.{render}")
+
+
+def _moves(ob: bpy.types.Object, path: str) -> bool:
+    """Whether a property of an object has a driver or an F-curve."""
+    data = ob.animation_data
+    drivers = data.drivers if data else []
+    return any(curve.data_path == path for curve in [*drivers, *action_curves(ob)])
+
+
+def _follow(modifier: bpy.types.Modifier, viewport: str, ob: bpy.types.Object, path: str) -> None:
+    """A driver that gives the viewport's property what the render's has at each frame."""
+    driver = modifier.driver_add(viewport).driver
+    driver.type = "SUM"
+    target = driver.variables.new().targets[0]
+    target.id, target.data_path = ob, path
 
 
 def _particles(settings: bpy.types.ParticleSettings) -> None:

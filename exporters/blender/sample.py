@@ -145,7 +145,7 @@ class Sampler:
             ob = instance.object
             if ob.type in _NOT_MESHES and not instance.is_instance and not ob.hide_render:
                 self.lost.add(ob.name, _NOT_MESHES[ob.type], "it is left out; convert it to a mesh first (Object > Convert)")
-            if ob.type not in ("MESH", "LIGHT"):
+            if ob.type not in ("MESH", "LIGHT") or _is_portal(ob):
                 continue
             if instance.is_instance:
                 parent = instance.parent
@@ -169,6 +169,11 @@ class Sampler:
             everything = {o.name_full for o in collection.all_objects}
             self._members[collection.name_full] = everything - _members(collection)
         return ob.original.name_full not in self._members[collection.name_full]
+
+
+def _is_portal(ob: bpy.types.Object) -> bool:
+    """A light that only tells Cycles where the sky comes in: it shines not itself."""
+    return ob.type == "LIGHT" and ob.data.type == "AREA" and getattr(getattr(ob.data, "cycles", None), "is_portal", False)
 
 
 def _members(collection: bpy.types.Collection) -> set[str]:

@@ -9,6 +9,7 @@ import math
 import shutil
 from pathlib import Path
 from typing import Any
+from urllib.parse import quote
 
 import bpy
 import numpy as np
@@ -35,6 +36,7 @@ def export_world(scene: bpy.types.Scene, folder: Path, stem: str, lost: Lost) ->
         return {"color": [0, 0, 0], "strength": 1}
     if output.inputs["Volume"].is_linked:
         lost.add(world.name, "world volume", "render the mist in compositing, from depth.Z")
+    _name_losses(world, tree, lost)
     background = output.inputs["Surface"].links[0].from_node
     if background.type == "BACKGROUND" and not background.inputs["Strength"].is_linked:
         strength = max(float(background.inputs["Strength"].default_value), 0.0)
@@ -47,10 +49,20 @@ def export_world(scene: bpy.types.Scene, folder: Path, stem: str, lost: Lost) ->
             if uri is None:
                 lost.add(world.name, f"image {image[0].name!r} is missing", "find it with File > External Data > Find Missing Files; the world is black")
                 return {"color": [0, 0, 0], "strength": 1}
-            return {"color": [1, 1, 1], "strength": tidy(strength), "image": uri, "rotation": tidy(image[1])}
+            return {"color": [1, 1, 1], "strength": tidy(strength), "image": quote(uri), "rotation": tidy(image[1])}
     if is_animated(tree):
         lost.add(world.name, "animated world nodes", "the sky of the first frame is used; animate only colour and strength of a Background node")
-    return {"color": [1, 1, 1], "strength": 1, "image": _bake(scene, folder, stem), "rotation": 0}
+    return {"color": [1, 1, 1], "strength": 1, "image": quote(_bake(scene, folder, stem)), "rotation": 0}
+
+
+def _name_losses(world: bpy.types.World, tree: bpy.types.NodeTree, lost: Lost) -> None:
+    """What rays of one kind see otherwise than those of another, and a sun as a part of the sky."""
+    if any(node.type == "LIGHT_PATH" for node in tree.nodes):
+        lost.add(world.name, "light path in the world", "what the camera sees lights the scene too; exchange the backdrop in compositing")
+    if not getattr(getattr(world, "cycles_visibility", None), "camera", True):
+        lost.add(world.name, "world hidden from the camera", "it is seen here; pass --transparent to buzz-convert")
+    if any(node.type == "TEX_SKY" and getattr(node, "sun_disc", False) for node in tree.nodes):
+        lost.add(world.name, "sun disc in the sky texture", "it throws no shadow with an edge; turn Sun Disc off and add a Sun light")
 
 
 def animate_world(animation: Animation, samples: list[tuple[float, ...]], world: dict[str, Any]) -> None:
@@ -150,11 +162,13 @@ def _bake(scene: bpy.types.Scene, folder: Path, stem: str) -> str:
     sky.collection.objects.link(camera)
     sky.camera = camera
     sky.render.engine = "CYCLES"
-    sky.cycles.samples, sky.cycles.use_denoising, sky.cycles.pixel_filter_type = 1, False, "BOX"
+    # A sun's disc is as small as a pixel: as many rays as find its share of one.
+    sky.cycles.samples, sky.cycles.use_denoising, sky.cycles.pixel_filter_type = 64, False, "BOX"
     sky.render.resolution_x, sky.render.resolution_y, sky.render.resolution_percentage = _BAKED_WIDTH, _BAKED_WIDTH // 2, 100
-    sky.render.filter_size = 0.01
+    sky.cycles.use_adaptive_sampling = False
     sky.render.image_settings.file_format = "OPEN_EXR"
-    sky.render.image_settings.color_depth = "16"
+    # Half floats end far below the sun.
+    sky.render.image_settings.color_depth = "32"
     sky.render.filepath = str(target)
     # Nothing is lit here, so Cycles need not work out where the sky is bright.
     scene.world.cycles.sampling_method = "NONE"

@@ -332,3 +332,80 @@ def test_particles(blender, export):
     assert len(nodes) == 10
     assert any(gltf.animated((n, "translation")) for n in nodes)
     assert math.isfinite(gltf.world(nodes[0], 6).sum())
+
+
+def test_geometry_nodes_may_make_several_meshes_of_one_form(blender, export):
+    import blender_scene as b
+
+    b.camera()
+    ob = b.cube("Blocks")
+    tree = blender.data.node_groups.new("Blocks", "GeometryNodeTree")
+    tree.interface.new_socket("Geometry", in_out="INPUT", socket_type="NodeSocketGeometry")
+    tree.interface.new_socket("Geometry", in_out="OUTPUT", socket_type="NodeSocketGeometry")
+    join, end = tree.nodes.new("GeometryNodeJoinGeometry"), tree.nodes.new("NodeGroupOutput")
+    for size in (1, 2, 3):
+        block, point = tree.nodes.new("GeometryNodeMeshCube"), tree.nodes.new("GeometryNodePoints")
+        block.inputs["Size"].default_value = (size, size, size)
+        instances = tree.nodes.new("GeometryNodeInstanceOnPoints")
+        tree.links.new(point.outputs[0], instances.inputs["Points"])
+        tree.links.new(block.outputs["Mesh"], instances.inputs["Instance"])
+        tree.links.new(instances.outputs[0], join.inputs[0])
+    tree.links.new(join.outputs[0], end.inputs[0])
+    ob.modifiers.new("g", "NODES").node_group = tree
+    gltf = export()
+    nodes = [i for i, n in enumerate(gltf.root["nodes"]) if n["name"] == "Blocks"]
+    sizes = sorted(round(float(np.ptp(gltf.triangles(n)[..., 0])), 4) for n in nodes)
+    assert sizes == [1, 2, 3]
+
+
+@pytest.mark.parametrize("kind", ["armature", "curve keys", "bevel"])
+def test_what_deforms_without_a_modifier_moves(blender, export, kind):
+    import blender_scene as b
+
+    blender.context.scene.frame_end = 3
+    b.camera()
+    curve = blender.data.curves.new("Curve", "CURVE")
+    curve.dimensions, curve.bevel_depth = "3D", 0.2
+    curve.splines.new("POLY").points.add(1)
+    curve.splines[0].points[1].co = (1, 0, 0, 1)
+    if kind == "armature":
+        blender.ops.object.armature_add()
+        rig, ob = blender.context.object, b.cube("Thing")
+        ob.vertex_groups.new(name="Bone").add(range(8), 1, "REPLACE")
+        ob.parent, ob.parent_type = rig, "ARMATURE"
+        b.key(rig.pose.bones["Bone"], "location", {1: (0, 0, 0), 3: (2, 0, 0)})
+    elif kind == "curve keys":
+        ob = b.link(blender.data.objects.new("Thing", curve))
+        ob.shape_key_add(name="Basis")
+        key = ob.shape_key_add(name="Up")
+        for point in key.data:
+            point.co.y += 2
+        b.key(key, "value", {1: 0.0, 3: 1.0})
+    else:
+        ob = b.link(blender.data.objects.new("Thing", curve))
+        profile = blender.data.curves.new("Profile", "CURVE")
+        profile.splines.new("POLY").points.add(2)
+        for point, place in zip(profile.splines[0].points, [(0, 0.1, 0, 1), (0.1, 0, 0, 1), (-0.1, 0, 0, 1)], strict=True):
+            point.co = place
+        b.key(profile.splines[0].points[0], "co", {1: (0, 0.1, 0, 1), 3: (0, 2.1, 0, 1)})
+        curve.bevel_mode, curve.bevel_object = "OBJECT", b.link(blender.data.objects.new("Profile", profile))
+    gltf = export()
+    first, last = (gltf.posed_points(gltf.node("Thing"), frame) for frame in (1, 3))
+    assert np.abs(last - first).max() == pytest.approx(2, abs=0.01)
+
+
+def test_texture_coordinates_that_change_are_named(blender, export):
+    import blender_scene as b
+
+    blender.context.scene.frame_end = 3
+    b.camera()
+    ob = b.plane("Sign")
+    ob.data.uv_layers.new()
+    warp = ob.modifiers.new("Warp", "UV_WARP")
+    b.key(warp, "offset", {1: (0.0, 0.0), 3: (1.0, 0.0)})
+    still = b.plane("Still")
+    still.data.uv_layers.new()
+    still.modifiers.new("Warp", "UV_WARP")
+    gltf = export()
+    assert gltf.lost_features("Sign") == ["texture coordinates, colours or material slots that change"]
+    assert gltf.lost_features("Still") == []

@@ -29,8 +29,20 @@ def test_spot(blender, export):
     _, light = export().light("Light")
     assert light["intensity"] == pytest.approx(683 * 50 / (4 * math.pi))
     assert light["spot"]["outerConeAngle"] == pytest.approx(0.6)
-    # Cycles: full strength where cos(theta) >= cos(half) + (1 - cos(half)) * blend.
-    assert math.cos(light["spot"]["innerConeAngle"]) == pytest.approx(math.cos(0.6) + (1 - math.cos(0.6)) * 0.25)
+
+
+@pytest.mark.parametrize("blend", [0.25, 1.0])
+def test_a_spots_cone_lets_as_much_light_through_as_in_cycles(blender, export, blend):
+    make(blender, "SPOT", spot_size=1.2, spot_blend=blend)
+    _, light = export().light("Light")
+    half, inner, outer = 0.6, light["spot"]["innerConeAngle"], light["spot"]["outerConeAngle"]
+    cosine = np.linspace(math.cos(half), 1, 10_001)
+    share = np.clip((cosine - math.cos(half)) / (1 - math.cos(half)) / blend, 0, 1)
+    cycles = share * share * (3 - 2 * share)
+    # KHR_lights_punctual, Inner and Outer Cone Angles.
+    gltf = np.clip((cosine - math.cos(outer)) / (math.cos(inner) - math.cos(outer)), 0, 1) ** 2
+    assert gltf.mean() == pytest.approx(cycles.mean(), rel=2e-3)
+    assert np.abs(gltf - cycles).max() < 0.16
 
 
 def test_sun(blender, export):
@@ -119,3 +131,19 @@ def test_what_a_light_loses_is_named(blender, export):
     ob.data.use_shadow = False
     features = export().lost_features("Light")
     assert {"area light spread", "light without shadows"} <= set(features)
+
+
+def test_portals_do_not_shine(blender, export):
+    make(blender, "AREA").data.cycles.is_portal = True
+    assert "lights" not in export().root.get("extensions", {}).get("KHR_lights_punctual", {})
+
+
+def test_lights_that_gltf_has_not_are_named(blender, export):
+    import blender_scene as b
+
+    make(blender, "SPOT", energy=-5.0).scale = (1, 2, 1)
+    linked = b.light("POINT", "Linked")
+    linked.light_linking.receiver_collection = blender.data.collections.new("Only these")
+    gltf = export()
+    assert {"negative light", "spot with different scales"} <= set(gltf.lost_features("Light"))
+    assert gltf.lost_features("Linked") == ["light linking"]

@@ -161,3 +161,21 @@ def test_named_losses_of_the_scene(blender, export):
     features = export().lost_features("Scene")
     assert {"frame step 2", "render region", "time stretching", "no camera"} <= set(features)
     assert b.bpy is blender
+
+
+def test_a_modifier_is_on_when_the_render_has_it_on(blender, export):
+    import blender_scene as b
+
+    blender.context.scene.frame_end = 4
+    b.camera()
+    ob = b.cube("Two")
+    array = ob.modifiers.new("Array", "ARRAY")
+    b.key(array, "show_render", {1: False, 3: True}, interpolation="CONSTANT")
+    array.driver_add("show_viewport").driver.expression = "0"
+    smooth = ob.modifiers.new("Smooth", "SUBSURF")
+    smooth.render_levels = 2
+    smooth.driver_add("levels").driver.expression = "1"
+    gltf = export()
+    nodes = [i for i, n in enumerate(gltf.root["nodes"]) if n["name"] == "Two"]
+    faces = [sum(len(gltf.triangles(n)) for n in nodes if gltf.visible(n, f)) for f in range(1, 5)]
+    assert faces == [192, 192, 384, 384]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from urllib.parse import unquote
 
 import numpy as np
 import pytest
@@ -155,3 +156,27 @@ def test_missing_image_is_named(blender, export, tmp_path):
     image.reload()
     gltf = export()
     assert any("is missing" in feature for feature in gltf.lost_features("World"))
+
+
+def test_a_sky_with_a_sun_is_as_bright_as_it_is(blender, export):
+    background, tree = world(blender)
+    sky = tree.nodes.new("ShaderNodeTexSky")
+    sky.sun_disc, sky.sun_elevation, sky.sun_size = True, 0.7, 0.02
+    tree.links.new(sky.outputs["Color"], background.inputs["Color"])
+    gltf = export("my 100%25.gltf")
+    assert gltf.lost_features("World") == ["sun disc in the sky texture"]
+    image = blender.data.images.load(str(gltf.path.parent / unquote(gltf.buzz["world"]["image"])))
+    width, height = image.size
+    pixels = np.array(image.pixels).reshape(height, width, 4)[..., :3].mean(axis=2)
+    assert pixels.max() > 65504, "half floats would end here"
+    # The disc's own radiance, everywhere in it.
+    disc = pixels[pixels > pixels.max() / 2]
+    assert 0.5 < len(disc) / (math.pi * (0.01 * width / (2 * math.pi)) ** 2 / math.cos(0.7)) < 2
+
+
+def test_what_a_world_loses_is_named(blender, export):
+    background, tree = world(blender)
+    path = tree.nodes.new("ShaderNodeLightPath")
+    tree.links.new(path.outputs["Is Camera Ray"], background.inputs["Strength"])
+    blender.context.scene.world.cycles_visibility.camera = False
+    assert set(export().lost_features("World")) == {"light path in the world", "world hidden from the camera"}
