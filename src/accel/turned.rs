@@ -30,7 +30,8 @@ impl Accel {
             });
             let positions = self.positions(index, mesh);
             let look = |[a, b, c]: [Vec3A; 3]| {
-                let normal = (b - a).cross(c - a) * placement.winding;
+                // In the object's own space, where a front is a front whatever its placement mirrors.
+                let normal = (b - a).cross(c - a);
                 let before = |(at, w): (Vec3A, f32)| normal.dot(at - a * w);
                 let (was, is) = (before(old), before(new));
                 let side = if culled { 1.0 } else { is.signum() };

@@ -11,8 +11,9 @@ use super::subpixel::Samples;
 use super::supersample::{Slot, Source, is_facing_alike};
 use crate::frame::{PixelClass, SurfaceSample};
 
-/// So many samples on its surface must agree before a sub-pixel borrows shadow bits from the 5x5 around it.
-const ENOUGH_TO_LEND: usize = 6;
+/// So many samples on its surface must agree before a sub-pixel that was cast borrows shadow bits from the 5x5 around it: more than
+/// for a pixel, as from sub-pixels no shadow's edge is followed.
+const ENOUGH_FOR_A_SUBPIXEL: usize = 6;
 
 /// The samples of the frame that is inferred from.
 pub(super) struct Carried<'a, R> {
@@ -68,7 +69,7 @@ impl<R: CastCentres> Source for Carried<'_, R> {
             None => slot.ask.fill(u32::MAX),
             Some(trust) => {
                 let around = Near::new(self, slot.at, 2);
-                let enough = if trust == Trust::Proof { around.size } else { ENOUGH_TO_LEND };
+                let enough = if trust == Trust::Proof { around.size } else { ENOUGH_FOR_A_SUBPIXEL };
                 self.lend_from(&around, slot, enough);
             }
         }

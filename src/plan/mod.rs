@@ -14,7 +14,7 @@ pub use weights::{SHADOW_RAY, Weights};
 use crate::frame::{FrameKind, Quality};
 use motion::find_cuts;
 use segments::{Chain, Range, divide};
-use std::collections::BTreeSet;
+use std::collections::{BTreeSet, HashMap};
 
 /// Longest segment where the user gives none. The cost model ends segments long before, unless the camera rests.
 pub const LONGEST_SEGMENT: u32 = 129;
@@ -153,11 +153,14 @@ impl Plan {
 /// are found and added.
 pub fn plan(path: &[PathFrame], cuts: &[i64], options: PlanOptions) -> Plan {
     let full = options.quality == Quality::Full;
-    let survey = Survey::of(path, cuts, options.quality, if full { 1 } else { options.longest_segment });
+    let longest = if full { 1 } else { options.longest_segment.max(1) };
+    // At most half of a segment is before its key frame, so that together they keep to the length.
+    let others = longest as usize - 1;
+    let survey = Survey::of(path, cuts, options.quality, |_| [others / 2, others - others / 2]);
     let mut plan = Plan { cuts: survey.cuts.clone(), ..Plan::default() };
     for segments::Share { ranges, cost } in divide(&survey.chains, options.workers) {
         for &range in &ranges {
-            survey.add(&mut plan, range, survey.reason(range.first, full));
+            survey.add(&mut plan, range, survey.reason(range.first, full, longest));
         }
         if let (Some(first), Some(last)) = (ranges.first(), ranges.last()) {
             plan.shares.push(Share { first: path[first.first].frame, last: path[last.last].frame, cost });
@@ -179,10 +182,11 @@ pub fn replay(
     segments: &[(Segment, Reason)],
     cuts: &[i64],
 ) -> Result<Plan, String> {
-    let lengths = segments.iter().map(|(s, _)| s.last.saturating_sub(s.first));
-    // A chain reaches half as far as the longest segment, and a key frame may be at the end of its segment.
-    let longest = lengths.max().unwrap_or(0).saturating_mul(2).saturating_add(2);
-    let survey = Survey::of(path, cuts, quality, u32::try_from(longest).unwrap_or(u32::MAX));
+    let frames = |from: i64, to: i64| usize::try_from(to.saturating_sub(from)).unwrap_or(0);
+    let of_key = |(s, _): &(Segment, Reason)| (s.key, [frames(s.first, s.key), frames(s.key, s.last)]);
+    let reaches: HashMap<i64, [usize; 2]> = segments.iter().map(of_key).collect();
+    let reach = |place: usize| reaches.get(&path[place].frame).copied().unwrap_or_default();
+    let survey = Survey::of(path, cuts, quality, reach);
     let mut plan = Plan { cuts: cuts.to_vec(), ..Plan::default() };
     for &(Segment { key, first, last }, reason) in segments {
         let range = Range { key: survey.place(key), first: plan.frames.len(), last: survey.place(last) };
@@ -212,7 +216,6 @@ pub fn replay(
 /// What is known about a path before it is divided.
 struct Survey<'a> {
     path: &'a [PathFrame],
-    longest_segment: u32,
     /// Named and found.
     cuts: Vec<i64>,
     /// Of each frame as a key frame; none reaches across a cut.
@@ -220,7 +223,13 @@ struct Survey<'a> {
 }
 
 impl<'a> Survey<'a> {
-    fn of(path: &'a [PathFrame], cuts: &[i64], quality: Quality, longest_segment: u32) -> Self {
+    /// `reach` says how many frames before and after each place may be inferred from it.
+    fn of(
+        path: &'a [PathFrame],
+        cuts: &[i64],
+        quality: Quality,
+        reach: impl Fn(usize) -> [usize; 2],
+    ) -> Self {
         let steps = motion::steps(path);
         let cuts = find_cuts(path, &steps, cuts);
         let shadow_rays: Vec<f64> = path.iter().map(|f| f.shadow_rays).collect();
@@ -231,9 +240,9 @@ impl<'a> Survey<'a> {
             let first = chains.len();
             let end = (first + 1..path.len()).find(|&i| cuts.contains(&path[i].frame)).unwrap_or(path.len());
             let (shot, rays) = (&steps[first..end - 1], &shadow_rays[first..end]);
-            chains.extend(Chain::of_shot(shot, rays, longest_segment.max(1) as usize - 1, &weights, unit));
+            chains.extend(Chain::of_shot(shot, rays, |key| reach(first + key), &weights, unit));
         }
-        Self { path, longest_segment, cuts, chains }
+        Self { path, cuts, chains }
     }
 
     /// The place of a frame in the path, whose frames follow on one another; beyond it for frames that it has not.
@@ -242,13 +251,13 @@ impl<'a> Survey<'a> {
         usize::try_from(frame.saturating_sub(first)).unwrap_or(self.path.len()).min(self.path.len())
     }
 
-    /// Why a segment begins at place `first`.
-    fn reason(&self, first: usize, full: bool) -> Reason {
+    /// Why a segment begins at place `first`, where segments are at most so long.
+    fn reason(&self, first: usize, full: bool, longest: u32) -> Reason {
         match first {
             _ if self.path.len() == 1 => Reason::Only,
             0 => Reason::First,
             _ if self.cuts.contains(&self.path[first].frame) => Reason::Cut,
-            _ if full || (self.longest_segment > 1 && !self.chains[first - 1].goes_on()) => Reason::Cost,
+            _ if full || (longest > 1 && !self.chains[first - 1].goes_on()) => Reason::Cost,
             _ => Reason::Length,
         }
     }

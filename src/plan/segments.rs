@@ -34,18 +34,18 @@ pub struct Range {
 
 impl Chain {
     /// The chains of every possible key frame of a shot with these steps, whose traced pixels take so many shadow rays,
-    /// frame by frame. Segments are of up to `others` frames besides the key: at most half of them before it, so that
-    /// together they keep to the length. `unit` camera rays a pixel are a cost of 1.
+    /// frame by frame. `reach` says for each frame how many before and after it are of interest if it is a key frame.
+    /// `unit` camera rays a pixel are a cost of 1.
     pub fn of_shot(
         steps: &[Step],
         shadow_rays: &[f64],
-        others: usize,
+        reach: impl Fn(usize) -> [usize; 2],
         weights: &Weights,
         unit: f64,
     ) -> Vec<Self> {
         let full = |frame: usize| Weights::traced_cost(shadow_rays[frame]);
-        let predict = |reach: &mut dyn Iterator<Item = (usize, Change)>| {
-            let (frames, changes): (Vec<usize>, Vec<Change>) = reach.unzip();
+        let predict = |chain: &mut dyn Iterator<Item = (usize, Change)>| {
+            let (frames, changes): (Vec<usize>, Vec<Change>) = chain.unzip();
             let each = frames.into_iter().zip(weights.traced(changes));
             let priced = each.map(|(frame, traced)| {
                 (weights.predicted_cost(traced, shadow_rays[frame]), traced, full(frame))
@@ -56,10 +56,11 @@ impl Chain {
         let chain = |key: usize| {
             let after = steps[key..].iter().map(|s| s.forward);
             let before = steps[..key].iter().rev().map(|s| s.backward);
+            let [backward, forward] = reach(key);
             Self {
                 key: full(key) / unit,
-                forward: predict(&mut (key + 1..).zip(after).take(others - others / 2)),
-                backward: predict(&mut (0..key).rev().zip(before).take(others / 2)),
+                forward: predict(&mut (key + 1..).zip(after).take(forward)),
+                backward: predict(&mut (0..key).rev().zip(before).take(backward)),
             }
         };
         (0..shadow_rays.len()).map(chain).collect()
@@ -202,7 +203,7 @@ mod tests {
         let change = Change { outside: new, pixels: 3.0, ..Change::default() };
         let step = Step { forward: change, backward: change };
         let unit = Weights::traced_cost(2.0);
-        Chain::of_shot(&vec![step; frames - 1], &vec![2.0; frames], 64, &Weights::HALF_PIXEL, unit)
+        Chain::of_shot(&vec![step; frames - 1], &vec![2.0; frames], |_| [32, 32], &Weights::HALF_PIXEL, unit)
     }
 
     fn cost(chains: &[Chain], range: &Range) -> f64 {

@@ -16,7 +16,7 @@ const SOFT: &str = "-r 64x36 --aov all --light-samples 8 --ambient-samples 4";
 
 #[test]
 fn a_still_camera_gives_the_same_values_in_soft_light() {
-    for quality in ["half-pixel", "full"] {
+    for quality in ["half-pixel", "centred", "verified", "full"] {
         let (folder, out) = fresh();
         let mut stage = softly_lit(Stage::new());
         stage.translate(CAMERA, &[[0.3, 1.1, 6.0]; 4]);

@@ -1,7 +1,7 @@
 //! What comes into view, and with it light and shadow: small scenes whose frames are compared with full traces, pixel by pixel.
 
 use buzz::accel::Accel;
-use buzz::frame::{Aov, Frame};
+use buzz::frame::{Aov, Frame, FrameKind};
 use buzz::measure::{Exposure, psnr};
 use buzz::output::MemorySink;
 use buzz::plan::{Plan, Segment};
@@ -75,6 +75,13 @@ impl Set {
         self.render(quality, aa, segments, (0..=last).collect())
     }
 
+    /// All frames traced. The last one shows what the first does not.
+    fn truth(&self, aa: u32) -> Vec<Frame> {
+        let frames = self.frames(Quality::Full, aa);
+        assert!(frames[0].color != frames[frames.len() - 1].color, "nothing comes in");
+        frames
+    }
+
     fn render(&self, quality: Quality, aa: u32, segments: Vec<Segment>, wanted: BTreeSet<i64>) -> Vec<Frame> {
         let mut settings = Settings { quality, aa, audit: true, ..Settings::new(160, 90) };
         settings.aovs = [Aov::Object].into_iter().collect();
@@ -90,7 +97,7 @@ impl Set {
     fn wrongly_lit(&self, quality: Quality) -> Vec<usize> {
         let differs = |(a, b): &(&[f32; 4], &[f32; 4])| (a[2] - b[2]).abs() > 0.02;
         let count = |(a, b): (&Frame, &Frame)| a.color.iter().zip(&b.color).filter(differs).count();
-        self.frames(quality, 1).iter().zip(&self.frames(Quality::Full, 1)).map(count).collect()
+        self.frames(quality, 1).iter().zip(&self.truth(1)).map(count).collect()
     }
 
     /// For each frame, the pixels that show another object than a full trace does.
@@ -101,9 +108,10 @@ impl Set {
 
     /// For each frame that differs at all, how far it is from a full trace.
     fn decibels(&self, quality: Quality, aa: u32) -> Vec<f64> {
-        let full = self.frames(Quality::Full, aa);
+        let full = self.truth(aa);
         let exposure = Exposure::of(full.iter().map(|f| f.color.as_slice()));
         let inferred = self.frames(quality, aa);
+        assert!(inferred[1..].iter().all(|f| f.kind != FrameKind::Traced));
         inferred.iter().zip(&full).filter_map(|(a, b)| psnr(&a.color, &b.color, exposure)).collect()
     }
 }
@@ -166,14 +174,15 @@ fn a_sheet_whose_plane_the_eye_crosses_is_seen_however_large_it_is() {
     let endless = |red: usize| Mesh::analytic(Shape::plane(f64::INFINITY, f64::INFINITY, false), red);
     let sheets: [(&str, &dyn Fn(usize) -> Mesh); 4] =
         [("small", &small), ("large", &large), ("shape", &shape), ("endless", &endless)];
-    for (name, sheet) in sheets {
+    let placements = [DVec3::ONE, DVec3::new(-1.0, 1.0, 1.0)];
+    for ((name, sheet), scale) in sheets.iter().flat_map(|&sheet| placements.map(|scale| (sheet, scale))) {
         let mut set = Set::new();
-        set.put(sheet(set.red), DAffine3::IDENTITY);
+        set.put(sheet(set.red), DAffine3::from_scale(scale));
         set.put(Mesh::plane(40.0, set.blue), DAffine3::from_translation(DVec3::new(0.0, -4.0, 0.0)));
         set.camera([[0.0, -0.1, 0.0], [0.0, 0.2, 0.0]].into_iter());
         for quality in [Quality::HalfPixel, Quality::Centred, Quality::Verified] {
             let wrong = set.wrong_objects(quality);
-            assert_eq!(wrong, [0, 0], "{name}, {quality:?}");
+            assert_eq!(wrong, [0, 0], "{name}, {scale}, {quality:?}");
         }
     }
 }

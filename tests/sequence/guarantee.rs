@@ -5,7 +5,7 @@
 //! beside it where they are there. `BUZZ_RESOLUTION=1280x720 BUZZ_FRAMES=all` measures at full size.
 
 use buzz::accel::Accel;
-use buzz::frame::{Frame, FrameKind};
+use buzz::frame::{Frame, FrameKind, PixelClass};
 use buzz::import::{ImportOptions, import};
 use buzz::measure::{Exposure, psnr};
 use buzz::output::MemorySink;
@@ -63,6 +63,9 @@ fn check(file: &Path) {
     let ours = render(&scene, &inferring, &frames, None);
     let offset = render(&scene, &full, &frames, Some(1));
     let inferred = ours.iter().filter(|f| f.kind != FrameKind::Traced).map(|f| f.number).collect();
+    let reused = ours.iter().filter(|f| f.kind != FrameKind::Traced).map(reused_share);
+    let least = reused.fold(1.0, f64::min);
+    assert!(least > 0.5, "{}: in a frame only {least} of the pixels are reused", file.display());
     let (ours, offset) = (mean_psnr(&ours, &truth, &inferred), mean_psnr(&offset, &truth, &inferred));
     let name = file.file_stem().unwrap_or_default().to_string_lossy();
     println!(
@@ -70,6 +73,12 @@ fn check(file: &Path) {
         inferred.len()
     );
     assert!(ours > offset - 1.0, "{name}: {ours:.2} dB is more than 1 dB under {offset:.2} dB");
+}
+
+/// Share of a frame's pixels that show old samples.
+fn reused_share(frame: &Frame) -> f64 {
+    let is_reused = |id: &&u8| PixelClass::ALL[usize::from(**id)].is_reused();
+    frame.class.iter().filter(is_reused).count() as f64 / frame.class.len() as f64
 }
 
 fn root() -> PathBuf {
