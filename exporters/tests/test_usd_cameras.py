@@ -163,3 +163,30 @@ def test_shutter_and_depth_of_field(usd_convert):
     assert gltf.root["cameras"][0]["extras"]["dof"]["fstop"] == pytest.approx(2.8)
     assert gltf.lost_features("/World/Camera") == ["depth of field"]
     assert Usd.TimeCode.Default() is not None
+
+
+@pytest.mark.parametrize(("name", "value"), [("exposure", 2.0), ("exposure:time", 0.5), ("exposure:iso", 200.0), ("exposure:fStop", 4.0)])
+def test_exposure_is_named(usd_convert, name, value):
+    made = u.stage()
+    u.camera(made, **{name: value})
+    assert usd_convert(made).lost_features("/World/Camera") == ["exposure"]
+
+
+@pytest.mark.parametrize(("rate", "codes"), [(24.0, 1000.0), (25.0, 5.0), (24 / 1.001, 24000 / 1001), (24 / 1.001, 23.976)])
+def test_frames_per_second(usd_convert, rate, codes):
+    """A second of movement is as many frames as the stage's framesPerSecond says, whatever its time codes are."""
+    made = u.stage(frames=None, rate=codes)
+    made.SetFramesPerSecond(rate)
+    made.SetStartTimeCode(0)
+    made.SetEndTimeCode(codes)
+    prim = u.camera(made)
+    for second in (0, 1):
+        UsdGeom.XformCommonAPI(prim).SetTranslate((second * 24.0, 0, 0), second * codes)
+    prim.CreateShutterOpenAttr(0.0)
+    prim.CreateShutterCloseAttr(codes / rate / 2)
+    gltf = usd_convert(made)
+    last = math.ceil(rate - 1e-6)
+    assert gltf.buzz["fps"][0] / gltf.buzz["fps"][1] == pytest.approx(rate, rel=1e-6)
+    assert (gltf.buzz["frame_start"], gltf.buzz["frame_end"]) == (0, last)
+    assert gltf.world(gltf.camera_at(0), 12)[0, 3] == pytest.approx(12 * 24 / rate, abs=1e-4)
+    assert gltf.buzz["shutter"] == pytest.approx(0.5, rel=1e-5)

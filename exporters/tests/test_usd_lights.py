@@ -103,6 +103,42 @@ def test_other_lights_are_named(usd_convert, kind, feature):
     assert feature in usd_convert(made).lost_features("/World/Light")
 
 
+def test_light_linking_is_named(usd_convert):
+    made = u.stage()
+    u.camera(made)
+    for name, kind in (("Only", "SphereLight"), ("AllBut", "SphereLight"), ("Shadow", "SphereLight"), ("Dome", "DomeLight"), ("Free", "SphereLight")):
+        api = UsdLux.LightAPI(made.DefinePrim(f"/World/{name}", kind))
+        links = api.GetShadowLinkCollectionAPI() if name == "Shadow" else api.GetLightLinkCollectionAPI()
+        if name == "AllBut":
+            links.ExcludePath("/World/Card")
+        elif name != "Free":
+            links.CreateIncludeRootAttr(False)
+            links.IncludePath("/World/Card")
+    gltf = usd_convert(made)
+    assert [gltf.lost_features(f"/World/{n}") for n in ("Only", "AllBut", "Shadow", "Dome")] == [["light linking"]] * 4
+    assert not gltf.lost_features("/World/Free")
+
+
+def test_names_that_look_like_uris(usd_convert, buzz, tmp_path):
+    """The world's image is found again by the renderer."""
+    Image.new("RGB", (8, 4), (10, 20, 30)).save(tmp_path / "sky.png")
+    made = u.stage(frames=None)
+    u.camera(made)
+    UsdLux.DomeLight(light(made, "DomeLight")).CreateTextureFileAttr("sky.png")
+    gltf = usd_convert(made, "a %25 %20#.gltf")
+    assert gltf.buzz["world"]["image"] == "a%20%2525%20%2520%23_world.png"
+    assert "missing" not in buzz("plan", gltf.path).stderr
+
+
+def test_output_folder_that_is_a_file(tmp_path):
+    (tmp_path / "s.usda").write_text("#usda 1.0\n")
+    (tmp_path / "file").write_text("")
+    for output in ("file/o.gltf", "file/below/o.glb"):
+        done = subprocess.run([sys.executable, str(SCRIPT), str(tmp_path / "s.usda"), str(tmp_path / output)], capture_output=True, text=True, check=False)
+        assert (done.returncode, len(done.stderr.splitlines())) == (4, 1), done.stderr
+        assert "choose another output folder" in done.stderr
+
+
 @pytest.mark.parametrize("turn", [0.0, 40.0])
 def test_dome(usd_convert, tmp_path, turn):
     """The image's centre is seen along the dome's +Z (OpenEXR); a quarter to its left is +X."""

@@ -13,7 +13,7 @@ pytest.importorskip("pxr", reason="SKIPPED LOUDLY: usd-core is not installed (pi
 import usd_scene as u
 from gltf_reader import primitive
 from PIL import Image
-from pxr import Gf, Sdf, UsdGeom, UsdUtils
+from pxr import Gf, Sdf, Usd, UsdGeom, UsdShade, UsdUtils
 
 
 def test_preview_surface(usd_convert):
@@ -36,6 +36,84 @@ def test_preview_surface(usd_convert):
     assert material["extensions"]["KHR_materials_clearcoat"]["clearcoatFactor"] == 1
     assert material["emissiveFactor"] == [1, 0.5, 0]
     assert material["extensions"]["KHR_materials_emissive_strength"]["emissiveStrength"] == 4
+
+
+def test_bindings_for_final_pictures(usd_convert):
+    """On a mesh and a subset: purpose full wins, and is enough alone; preview is not for final pictures."""
+    made = u.stage()
+    u.camera(made)
+    red, green = u.preview(made, "/World/Red"), u.preview(made, "/World/Green")
+    for name, bindings in {"Both": {"": green, "full": red}, "Full": {"full": red}, "All": {"": red, "preview": green}}.items():
+        api = UsdShade.MaterialBindingAPI.Apply(u.quad(made, f"/World/{name}").GetPrim())
+        for purpose, material in bindings.items():
+            api.Bind(material, UsdShade.Tokens.fallbackStrength, purpose)
+    box = u.cube(made, "/World/Box")
+    subset = UsdGeom.Subset.CreateGeomSubset(box, "Lid", "face", [4, 5], "materialBind")
+    UsdShade.MaterialBindingAPI.Apply(subset.GetPrim()).Bind(red, UsdShade.Tokens.fallbackStrength, "full")
+    gltf = usd_convert(made)
+
+    def bound(name):
+        mesh = gltf.root["meshes"][gltf.root["nodes"][gltf.node(name)]["mesh"]]
+        return {gltf.root["materials"][p["material"]]["name"] for p in mesh["primitives"]}
+
+    assert [bound(n) for n in ("Both", "Full", "All")] == [{"Red"}] * 3
+    assert bound("Box") == {"Red", "displayColor"}
+
+
+def test_instances_bound_to_other_materials_for_final_pictures(usd_convert, tmp_path):
+    """Two instances of one prototype that differ only in what is bound for purpose full."""
+    asset = Usd.Stage.CreateNew(str(tmp_path / "asset.usda"))
+    asset.SetDefaultPrim(UsdGeom.Xform.Define(asset, "/Asset").GetPrim())
+    u.quad(asset, "/Asset/Geo")
+    asset.Save()
+    made = u.stage()
+    u.camera(made)
+    for name in ("Red", "Green"):
+        prim = UsdGeom.Xform.Define(made, f"/World/I{name}").GetPrim()
+        prim.GetReferences().AddReference("asset.usda")
+        prim.SetInstanceable(True)
+        UsdShade.MaterialBindingAPI.Apply(prim).Bind(u.preview(made, f"/World/{name}"), UsdShade.Tokens.fallbackStrength, "full")
+    gltf = usd_convert(made)
+    meshes = [gltf.root["meshes"][n["mesh"]] for n in gltf.root["nodes"] if n["name"] == "Geo"]
+    assert {gltf.root["materials"][m["primitives"][0]["material"]]["name"] for m in meshes} == {"Red", "Green"}
+
+
+def test_inherited_display_colour_of_shapes(usd_convert):
+    made = u.stage()
+    u.camera(made)
+    group = UsdGeom.Xform.Define(made, "/World/Group")
+    UsdGeom.PrimvarsAPI(group).CreatePrimvar("displayColor", Sdf.ValueTypeNames.Color3fArray, "constant").Set([(1, 0, 0)])
+    UsdGeom.Sphere.Define(made, "/World/Group/Ball")
+    many = UsdGeom.Sphere.Define(made, "/World/Many")
+    many.CreateDisplayColorPrimvar("vertex").Set([(0, 1, 0), (0, 0, 1)])
+    gltf = usd_convert(made)
+    material = gltf.root["materials"][primitive(gltf, "Ball")[0]["material"]]
+    assert material["pbrMetallicRoughness"]["baseColorFactor"] == [1, 0, 0, 1]
+    assert gltf.lost_features("/World/Many") == ["displayColor that varies over a shape"]
+
+
+def test_animated_primvars_are_named_where_they_are_seen(usd_convert, tmp_path):
+    Image.new("RGB", (2, 2)).save(tmp_path / "t.png")
+    made = u.stage()
+    u.camera(made)
+    material = u.preview(made, "/World/M")
+    u.texture(made, material, "diffuseColor", "t.png")
+    corners = [(0, 0), (1, 0), (1, 1), (0, 1)]
+    for name, bound in (("Moving", True), ("Same", True), ("Unread", False)):
+        prim = u.quad(made, f"/World/{name}")
+        u.uv(prim, corners)
+        primvar = UsdGeom.PrimvarsAPI(prim).GetPrimvar("st")
+        for frame in (1, 5):
+            primvar.Set([Gf.Vec2f(s + (frame if name != "Same" else 0), t) for s, t in corners], frame)
+        colour = prim.CreateDisplayColorPrimvar("constant")
+        for frame in (1, 5):
+            colour.Set([(frame / 5, 0, 0)], frame)
+        if bound:
+            u.bind(prim, material)
+    gltf = usd_convert(made)
+    assert gltf.lost_features("/World/Moving") == ["animated primvar st"]
+    assert gltf.lost_features("/World/Same") == []
+    assert gltf.lost_features("/World/Unread") == ["animated primvar displayColor"]
 
 
 def test_opacity_threshold_is_a_mask(usd_convert):
@@ -69,8 +147,6 @@ def test_textures_go_into_gltfs_channels(usd_convert, tmp_path):
 
 def test_texture_transform_turns_over(usd_convert, tmp_path):
     """UsdTransform2d and KHR_texture_transform send a point to the same texel, v counted from the other end."""
-    from pxr import UsdShade
-
     Image.new("RGB", (2, 2)).save(tmp_path / "t.png")
     made = u.stage()
     u.camera(made)
@@ -133,8 +209,6 @@ def test_what_is_not_carried_is_named(usd_convert):
 
 
 def test_display_colour_read_by_a_material(usd_convert):
-    from pxr import UsdShade
-
     made = u.stage()
     u.camera(made)
     prim = u.quad(made, "/World/Card")

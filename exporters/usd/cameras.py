@@ -37,6 +37,7 @@ class CameraTrack:
         lens = {"focal": camera.focalLength, "near": camera.clippingRange.min * units, "far": camera.clippingRange.max * units}
         lens |= {"shift_x": middle[0] / half[0], "shift_y": middle[1] / half[1], "aspect": half[0] / half[1]}
         lens |= {"fstop": camera.fStop, "focus": camera.focusDistance * units}
+        lens["exposure"] = UsdGeom.Camera(self.prim).ComputeLinearExposureScale(time)
         if camera.projection == Gf.Camera.Orthographic:
             lens |= {"xmag": half[0] * units, "ymag": half[1] * units}
         else:
@@ -54,6 +55,8 @@ class CameraTrack:
             lost.add(path, "projection that changes from perspective to orthographic", "use two cameras and a cut")
             self.lens = [lens if ("xmag" in lens) == ortho else first for lens in self.lens]
         values = {k: np.array([lens[k] for lens in self.lens]) for k in first}
+        if np.abs(values["exposure"] - 1).max() > 1e-6:
+            lost.add(path, "exposure", "the picture is as bright as at exposure 0; expose it in compositing")
         kind = "orthographic" if ortho else "perspective"
         near, far = float(first["near"]), float(first["far"])
         body: dict[str, Any]

@@ -27,6 +27,7 @@ from .walk import Found, Walker
 
 _DEFAULT_WIDTH = 1280
 _LONGEST = 100_000
+_FAR = 1e5
 # Where the light comes from in a stage without a camera: above and behind the one who looks along -Z.
 _DOWNWARDS = np.array([[[0.8, -0.35, 0.49, 0], [0, 0.81, 0.58, 0], [-0.6, -0.47, 0.65, 0], [0, 0, 0, 1]]])
 
@@ -69,6 +70,10 @@ def convert(source: Path, target: Path, options: Options) -> Result:
     if target.suffix not in (".gltf", ".glb"):
         raise OutputError(f"{target}: the name must end in .gltf or .glb")
     try:
+        target.parent.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise OutputError(f"{target.parent}: cannot be written ({error.strerror}); choose another output folder") from error
+    try:
         return _Conversion(source, target, options).run()
     except Tf.ErrorException as error:
         # What USD itself refuses, such as an xformOp that does not exist.
@@ -88,7 +93,10 @@ class _Conversion:
         self.root[:3, :3] *= self.units
         if self.up == UsdGeom.Tokens.z:
             self.root = self.root @ np.array([[1, 0, 0, 0], [0, 0, 1, 0], [0, -1, 0, 0], [0, 0, 0, 1]], float)
-        self.fps = extras.rational(self.stage.GetTimeCodesPerSecond() or 24.0)
+        codes = extras.rational(self.stage.GetTimeCodesPerSecond() or 24.0)
+        rated = self.stage.HasAuthoredMetadata("framesPerSecond") and self.stage.GetFramesPerSecond() > 0
+        self.fps = extras.rational(self.stage.GetFramesPerSecond()) if rated else codes
+        self.codes_per_frame = codes[0] * self.fps[1] / (codes[1] * self.fps[0])
         self._settings()
         self._bake_skins()
         self.walker = Walker(self.stage, self.lost)
@@ -148,7 +156,8 @@ class _Conversion:
             times = [t for prim in Usd.PrimRange.Stage(self.stage) for a in prim.GetAuthoredAttributes() for t in a.GetTimeSamples()]
         if not all(math.isfinite(t) for t in times):
             raise InputError(f"{self.source}: its time codes are no numbers; pass --frames FIRST-LAST")
-        return (math.floor(min(times)), math.ceil(max(times))) if times else (0, 0)
+        frames = [round(t / self.codes_per_frame, 6) for t in times]
+        return (math.floor(min(frames)), math.ceil(max(frames))) if frames else (0, 0)
 
     def run(self) -> Result:
         """Do the whole job."""
@@ -166,12 +175,14 @@ class _Conversion:
             for name, values in vars(track).items():
                 if isinstance(values, list):
                     setattr(track, name, [values[i] for i in order])
+        for key, track in [*self.tracks.items(), *self.lights.items(), *self.cameras.items()]:
+            if stands_still(np.array(track.poses)):
+                self.lost.add(key[-1], "movement too far from the origin", "single precision cannot hold its steps; move the set to the origin")
         frames = [self.taken[i] for i in order]
         self.options.progress(f"writing {len(self.geometry.items)} meshes")
         document = Document()
         animation = motion.Animation(document, [(f - first) * self.fps[1] / self.fps[0] for f in frames])
-        now = Usd.TimeCode(first)
-        materials = Materials(document, Textures(document, self.target, self.lost), self.lost, now)
+        materials = Materials(document, Textures(document, self.target, self.lost), self.lost, self._time(first))
         self.geometry.write(document, materials, np.array(self.taken))
         for track in self.tracks.values():
             self._write_track(document, animation, track)
@@ -210,8 +221,11 @@ class _Conversion:
         places = poses[..., :3, 3].reshape(-1, 3)
         return motion.steps_between(poses, max(float(np.linalg.norm(np.ptp(places, axis=0))), 1.0))
 
+    def _time(self, frame: float) -> Usd.TimeCode:
+        return Usd.TimeCode(frame * self.codes_per_frame)
+
     def _at(self, frame: float) -> None:
-        time, sample = Usd.TimeCode(frame), len(self.taken)
+        time, sample = self._time(frame), len(self.taken)
         seen = set()
         aspect = None
         if self.resolution is not None:
@@ -346,8 +360,19 @@ class _Conversion:
         if track is None:
             return None
         camera = UsdGeom.Camera(track.prim)
-        opened, closed = camera.GetShutterOpenAttr().Get(self.frames[0]), camera.GetShutterCloseAttr().Get(self.frames[0])
-        return closed - opened if closed > opened else None
+        now = self._time(self.frames[0])
+        opened, closed = camera.GetShutterOpenAttr().Get(now), camera.GetShutterCloseAttr().Get(now)
+        return (closed - opened) / self.codes_per_frame if closed > opened else None
+
+
+def stands_still(poses: np.ndarray) -> bool:
+    """Whether places so far out move by less than single precision, which glTF has, can tell apart there."""
+    places = poses[:, :3, 3]
+    steps = np.abs(np.diff(places, axis=0)).max(axis=0, initial=0)
+    far = np.abs(places).max(axis=0)
+    # Far less than that is the rounding of double precision, no movement.
+    rounding = np.spacing(far.astype(np.float32))
+    return bool(((far > _FAR) & (steps < rounding) & (steps > rounding * 1e-6)).any())
 
 
 def save(document: Document, target: Path) -> None:

@@ -10,6 +10,7 @@ import math
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
+from urllib.parse import quote
 
 import numpy as np
 from pxr import Usd, UsdGeom, UsdLux
@@ -185,11 +186,17 @@ def _warn(prim: Usd.Prim, lost: Lost) -> None:
             lost.add(path, "shaping of an area light", "it shines over the whole half space; use a sphere light for a beam")
     if prim.HasAPI(UsdLux.ShadowAPI) and not _get(prim, "inputs:shadow:enable", now, True):
         lost.add(path, "light without shadows", "it casts shadows here")
-    for name in ("collection:lightLink:excludes", "collection:shadowLink:excludes"):
-        relation = prim.GetRelationship(name)
-        if relation and relation.GetTargets():
+    _warn_of_links(prim, lost)
+
+
+def _warn_of_links(prim: Usd.Prim, lost: Lost) -> None:
+    """Name what chooses the things that a light lights."""
+    path, light = str(prim.GetPath()), UsdLux.LightAPI(prim)
+    for links in (light.GetLightLinkCollectionAPI(), light.GetShadowLinkCollectionAPI()):
+        # Without an opinion of the scene's the root is included: all things are.
+        if links.GetExcludesRel().GetTargets() or links.GetIncludeRootAttr().Get() is False:
             lost.add(path, "light linking", "it lights everything here")
-    if UsdLux.LightAPI(prim).GetFiltersRel().GetTargets():
+    if light.GetFiltersRel().GetTargets():
         lost.add(path, "light filters", "they are left out")
 
 
@@ -212,6 +219,7 @@ class DomeTrack:
 def write_dome(prim: Usd.Prim, time: Usd.TimeCode, world: np.ndarray, up: str, target: Path, lost: Lost) -> dict[str, Any]:
     """A dome light as `extras.buzz.world`. `world` is its matrix in glTF's space, scale aside."""
     path = str(prim.GetPath())
+    _warn_of_links(prim, lost)
     light = radiance(prim, time)
     strength = max(float(light.max()), 0.0)
     out: dict[str, Any] = {"color": [tidy(c / strength) if strength else 0 for c in light], "strength": tidy(strength)}
@@ -243,4 +251,4 @@ def write_dome(prim: Usd.Prim, time: Usd.TimeCode, world: np.ndarray, up: str, t
         lost.add(path, "tilted dome", "only its turn about the vertical is carried; rotate the image instead")
     # USD's (OpenEXR's) centre looks along +Z of the dome, docs/extras.md's along +X: from +X to +Z is -90 degrees.
     forward = turn @ np.array([0.0, 0.0, 1.0])
-    return out | {"image": file, "rotation": tidy(math.atan2(-forward[2], forward[0]))}
+    return out | {"image": quote(file), "rotation": tidy(math.atan2(-forward[2], forward[0]))}

@@ -1,12 +1,11 @@
 """UsdPreviewSurface to glTF materials; MaterialX surfaces by their constants where a stage has nothing else.
 
-Sources: the UsdPreviewSurface specification (inputs, texture reader, transform 2d) and KHR_texture_transform.
+Source: the UsdPreviewSurface specification. Texture nodes are read by readers.py.
 """
 
 from __future__ import annotations
 
-import math
-from dataclasses import dataclass
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -15,10 +14,9 @@ from pxr import Gf, Usd, UsdShade
 from ..common.document import Document
 from ..common.extras import tidy
 from ..common.report import Lost
-from .textures import Channel, Textures, resolved_path
+from .readers import Reader, Readers
+from .textures import Channel, Textures
 
-_WRAP = {"repeat": 10497, "mirror": 33648, "clamp": 33071, "black": 33071, "useMetadata": 10497}
-_BLACK_FALLBACK = (0.0, 0.0, 0.0, 1.0)
 # MaterialX surfaces without a UsdPreviewSurface beside them: input names for what glTF has.
 _MATERIALX = {
     "ND_standard_surface_surfaceshader": ("base_color", "metalness", "specular_roughness", "specular_IOR", "transmission", "base"),
@@ -27,15 +25,9 @@ _MATERIALX = {
 }
 
 
-@dataclass
-class Reader:
-    """A UsdUVTexture as one input sees it."""
-
-    channel: Channel
-    wrap: tuple[int, int]
-    st: str
-    transform: dict[str, Any] | None
-    fallback: tuple[float, ...]
+def bound_material(prim: Usd.Prim) -> UsdShade.Material:
+    """What is bound to a prim for final pictures, else for all purposes; invalid without either."""
+    return UsdShade.MaterialBindingAPI(prim).ComputeBoundMaterial(UsdShade.Tokens.full)[0]
 
 
 class Materials:
@@ -51,22 +43,22 @@ class Materials:
 
         `plain` is the colour of a prim without a material.
         """
-        material = UsdShade.MaterialBindingAPI(prim).ComputeBoundMaterial()[0]
+        material = bound_material(prim)
         path = str(material.GetPath()) if material else ""
         key = (path, double_sided, () if path else plain, tuple(names) if path else ())
         if key not in self._known:
             self._sets_of: list[str] = []
             self._display = not path
-            data = self._material(material, names) if path else _plain(plain)
+            data = self._material(material) if path else _plain(plain)
             if double_sided:
                 data["doubleSided"] = True
             self._known[key] = self.document.append("materials", data)
             self._sets[self._known[key]] = (self._sets_of, self._display)
         return self._known[key], *self._sets[self._known[key]]
 
-    def _material(self, material: UsdShade.Material, names: list[str]) -> dict[str, Any]:
+    def _material(self, material: UsdShade.Material) -> dict[str, Any]:
         path = str(material.GetPath())
-        self._names = names
+        self._read = Readers(path, self.time, self.lost)
         shader = material.ComputeSurfaceSource()[0]
         shader_id = shader.GetIdAttr().Get() if shader else None
         if shader_id != "UsdPreviewSurface":
@@ -91,9 +83,9 @@ class Materials:
         pbr: dict[str, Any] = {}
         out: dict[str, Any] = {"name": material.GetPrim().GetName(), "pbrMetallicRoughness": pbr}
         self._base(shader, path, out, pbr)
-        workflow = self._value(shader, "useSpecularWorkflow", 0)
+        workflow = self._read.value(shader, "useSpecularWorkflow", 0)
         if workflow:
-            colour = self._value(shader, "specularColor", Gf.Vec3f(0))
+            colour = self._read.value(shader, "specularColor", Gf.Vec3f(0))
             self._extension(out, "KHR_materials_specular", {"specularColorFactor": [tidy(max(c, 0)) for c in colour]})
             self.lost.add(path, "specular workflow", "its specular colour tints the highlights of a dielectric; metals need metallic instead")
             pbr["metallicFactor"] = 0
@@ -108,7 +100,7 @@ class Materials:
             texture = self._single(occlusion, 0, path, "occlusion")
             if texture is not None:
                 out["occlusionTexture"] = self._info(texture, occlusion)
-        ior = float(self._value(shader, "ior", 1.5))
+        ior = float(self._read.value(shader, "ior", 1.5))
         if abs(ior - 1.5) > 1e-6 and (ior >= 1 or ior == 0):
             self._extension(out, "KHR_materials_ior", {"ior": tidy(ior)})
         coat = self._input(shader, "clearcoat", 0.0, path)
@@ -128,32 +120,29 @@ class Materials:
     def _base(self, shader: UsdShade.Shader, path: str, out: dict, pbr: dict) -> None:
         colour = self._input(shader, "diffuseColor", Gf.Vec3f(0.18), path)
         opacity = self._input(shader, "opacity", 1.0, path)
-        threshold = float(self._value(shader, "opacityThreshold", 0.0))
+        threshold = float(self._read.value(shader, "opacityThreshold", 0.0))
         factor = [1.0, 1.0, 1.0, 1.0]
         alpha = isinstance(opacity, Reader) or opacity < 1
         if isinstance(colour, Reader):
-            if any(abs(b) > 1e-6 for b in colour.channel.bias[:3]):
-                self.lost.add(path, "bias of the diffuse texture", "bake it into the image")
-            factor[:3] = [tidy(min(max(s, 0), 1)) for s in colour.channel.scale[:3]]
+            factor[:3], channel = _factored(colour.channel, highest=1)
         else:
             factor[:3] = [tidy(min(max(c, 0), 1)) for c in colour]
         if not isinstance(opacity, Reader):
             factor[3] = tidy(min(max(opacity, 0), 1))
         texture, reader = None, colour
         if isinstance(colour, Reader) and isinstance(opacity, Reader):
-            same = opacity.channel.asset == colour.channel.asset and opacity.channel.output == "a" and opacity.channel.scale[3] == 1
-            if same and colour.channel.output == "rgb":
-                texture = self.textures.copied(colour.channel.asset, path, colour.wrap)
+            self._one_place(path, {"diffuseColor": colour, "opacity": opacity})
+            same = (opacity.channel.asset, opacity.channel.output, channel.output) == (channel.asset, "a", "rgb")
+            if same and _plain_channel(opacity.channel) and _plain_channel(channel):
+                texture = self.textures.copied(channel, path, colour.wrap, colour=True)
             else:
-                texture = self.textures.packed(_rgb(colour.channel) | {3: opacity.channel}, path, colour.wrap, "base")
+                texture = self.textures.packed(_rgb(channel) | {3: opacity.channel}, path, colour.wrap, "base", colour=True)
         elif isinstance(colour, Reader):
-            pixels = self.textures.pixels(colour.channel.asset, path) if not alpha else None
-            opaque = pixels is None or pixels[..., 3].min() >= 1
-            if colour.channel.output == "rgb" and (opaque or not alpha):
+            if channel.output == "rgb" and not alpha and _plain_channel(channel):
                 # An alpha channel that nothing reads does no harm: alphaMode stays OPAQUE.
-                texture = self.textures.copied(colour.channel.asset, path, colour.wrap)
+                texture = self.textures.copied(channel, path, colour.wrap, colour=True)
             else:
-                texture = self.textures.packed(_rgb(colour.channel), path, colour.wrap, "base")
+                texture = self.textures.packed(_rgb(channel), path, colour.wrap, "base", colour=True)
         elif isinstance(opacity, Reader):
             reader = opacity
             texture = self.textures.packed({0: 1.0, 1: 1.0, 2: 1.0, 3: opacity.channel}, path, opacity.wrap, "opacity")
@@ -176,13 +165,15 @@ class Materials:
         pbr["roughnessFactor"] = 1 if isinstance(rough, Reader) else tidy(min(max(rough, 0), 1))
         if not readers:
             return
+        if len(readers) == 2:
+            self._one_place(path, {"metallic": metal, "roughness": rough})
         ready = (
-            all(r.channel.asset == readers[0].channel.asset and _plain_channel(r.channel) for r in readers)
+            all((r.channel.asset, r.channel.space) == (readers[0].channel.asset, readers[0].channel.space) and _plain_channel(r.channel) for r in readers)
             and (not isinstance(metal, Reader) or metal.channel.output == "b")
             and (not isinstance(rough, Reader) or rough.channel.output == "g")
         )
         if ready:
-            texture = self.textures.copied(readers[0].channel.asset, path, readers[0].wrap)
+            texture = self.textures.copied(readers[0].channel, path, readers[0].wrap)
         else:
             parts: dict[int, Channel | float] = {0: 1.0}
             parts[1] = rough.channel if isinstance(rough, Reader) else 1.0
@@ -200,7 +191,7 @@ class Materials:
             return
         standard = np.allclose(normal.channel.scale[:3], 2) and np.allclose(normal.channel.bias[:3], -1)
         if standard:
-            texture = self.textures.copied(normal.channel.asset, path, normal.wrap)
+            texture = self.textures.copied(normal.channel, path, normal.wrap)
         else:
             texture = self.textures.normal(normal.channel, path, normal.wrap)
         if texture is not None:
@@ -208,16 +199,21 @@ class Materials:
 
     def _emission(self, shader: UsdShade.Shader, path: str, out: dict) -> None:
         emission = self._input(shader, "emissiveColor", Gf.Vec3f(0), path)
-        factor = np.maximum(emission.channel.scale[:3] if isinstance(emission, Reader) else list(emission), 0)
         if isinstance(emission, Reader):
-            if emission.channel.output == "rgb":
-                texture = self.textures.copied(emission.channel.asset, path, emission.wrap)
+            factor, channel = _factored(emission.channel, highest=np.inf)
+            # An image holds 0 to 1: what is brighter goes into the factor.
+            top = self.textures.top(channel, path)
+            factor, channel = np.array(factor) * top, _scaled(channel, 1 / top)
+            if channel.output == "rgb" and _plain_channel(channel):
+                texture = self.textures.copied(channel, path, emission.wrap, colour=True)
             else:
-                texture = self.textures.packed(_rgb(emission.channel), path, emission.wrap, "emission")
+                texture = self.textures.packed(_rgb(channel), path, emission.wrap, "emission", colour=True)
             if texture is None:
                 factor = np.maximum(emission.fallback[:3], 0)
             else:
                 out["emissiveTexture"] = self._info(texture, emission)
+        else:
+            factor = np.maximum(list(emission), 0)
         strength = max(float(np.max(factor)), 1.0)
         if np.max(factor) > 0:
             out["emissiveFactor"] = [tidy(f / strength) for f in factor]
@@ -227,7 +223,7 @@ class Materials:
     def _materialx(self, material: UsdShade.Material, shader: UsdShade.Shader, inputs: tuple[str, ...]) -> dict[str, Any]:
         path = str(material.GetPath())
         self.lost.add(path, "MaterialX surface", "only its plain colour, metal, roughness, ior and transmission are used; give it a UsdPreviewSurface too")
-        colour, metal, rough, ior, transmission, weight = (self._constant(shader, name) if name else None for name in inputs)
+        colour, metal, rough, ior, transmission, weight = (self._read.constant(shader, name) if name else None for name in inputs)
         base = list(colour) if colour is not None else [0.8, 0.8, 0.8]
         scale = 1.0 if weight is None else float(weight)
         pbr = {"baseColorFactor": [*(tidy(min(max(c * scale, 0), 1)) for c in base), 1]}
@@ -240,17 +236,6 @@ class Materials:
             self._extension(out, "KHR_materials_transmission", {"transmissionFactor": tidy(min(transmission, 1))})
         return out
 
-    def _constant(self, shader: UsdShade.Shader, name: str) -> Any:
-        found = shader.GetInput(name)
-        for attribute in UsdShade.Utils.GetValueProducingAttributes(found) if found else ():
-            if UsdShade.Utils.GetType(attribute.GetName()) != UsdShade.AttributeType.Output:
-                return attribute.Get(self.time)
-        return None
-
-    def _value(self, shader: UsdShade.Shader, name: str, default: Any) -> Any:
-        value = self._constant(shader, name)
-        return default if value is None else value
-
     def _input(self, shader: UsdShade.Shader, name: str, default: Any, path: str) -> Any:
         """A number, a colour, or the Reader of a texture."""
         found = shader.GetInput(name)
@@ -258,68 +243,34 @@ class Materials:
             return default
         for attribute in UsdShade.Utils.GetValueProducingAttributes(found):
             if UsdShade.Utils.GetType(attribute.GetName()) != UsdShade.AttributeType.Output:
-                value = attribute.Get(self.time)
-                if attribute.ValueMightBeTimeVarying():
-                    self.lost.add(path, f"animated {name}", "the value of the first frame is used")
+                value = self._read.at_first_frame(attribute, name)
                 return default if value is None else value
             node = UsdShade.Shader(attribute.GetPrim())
             kind = node.GetIdAttr().Get()
             if kind == "UsdUVTexture":
-                return self._reader(node, attribute.GetBaseName(), path)
+                return self._read.texture(node, attribute.GetBaseName())
             if kind and kind.startswith("UsdPrimvarReader"):
-                variable = str(self._value(node, "varname", ""))
+                variable = str(self._read.value(node, "varname", ""))
                 if variable in ("displayColor", "displayOpacity"):
                     # Vertex colours multiply the base colour in glTF: a factor of 1 gives them alone.
                     self._display = True
                     return Gf.Vec3f(1) if name == "diffuseColor" else 1.0
                 self.lost.add(path, f"{name} from primvar {variable!r}", "only displayColor and displayOpacity are carried; use a texture")
-                return self._value(node, "fallback", default)
+                return self._read.value(node, "fallback", default)
             self.lost.add(path, f"{name} from a {kind} node", "only textures and constants are carried; bake it")
             return default
         return default
 
-    def _reader(self, node: UsdShade.Shader, output: str, path: str) -> Reader:
-        asset = self._value(node, "file", None)
-        name = resolved_path(asset) if asset is not None else ""
-        if "<UDIM>" in name or "<udim>" in name:
-            self.lost.add(path, "UDIM texture", "bake the tiles into one image")
-        scale = tuple(float(x) for x in self._value(node, "scale", (1, 1, 1, 1)))
-        bias = tuple(float(x) for x in self._value(node, "bias", (0, 0, 0, 0)))
-        wrap = tuple(_WRAP.get(str(self._value(node, key, "useMetadata")), 10497) for key in ("wrapS", "wrapT"))
-        st, transform = self._coordinates(node)
-        fallback = tuple(float(x) for x in self._value(node, "fallback", _BLACK_FALLBACK))
-        return Reader(Channel(name, output, scale, bias), wrap, st, transform, fallback)
-
-    def _coordinates(self, node: UsdShade.Shader) -> tuple[str, dict[str, Any] | None]:
-        """Name of the primvar a texture reads, and its UsdTransform2d as KHR_texture_transform (v turned over)."""
-        transform = None
-        current = node.GetInput("st")
-        while current:
-            attributes = UsdShade.Utils.GetValueProducingAttributes(current)
-            if not attributes:
-                break
-            source = UsdShade.Shader(attributes[0].GetPrim())
-            kind = source.GetIdAttr().Get() if source else None
-            if kind == "UsdTransform2d":
-                angle = math.radians(float(self._value(source, "rotation", 0.0)))
-                sx, sy = (float(x) for x in self._value(source, "scale", (1, 1)))
-                tx, ty = (float(x) for x in self._value(source, "translation", (0, 0)))
-                transform = {
-                    "offset": [tidy(tx - sy * math.sin(angle)), tidy(1 - ty - sy * math.cos(angle))],
-                    "rotation": tidy(-angle),
-                    "scale": [tidy(sx), tidy(sy)],
-                }
-                current = source.GetInput("in")
-                continue
-            if kind and kind.startswith("UsdPrimvarReader"):
-                return str(self._value(source, "varname", "st")), transform
-            break
-        return "st", transform
+    def _one_place(self, path: str, readers: dict[str, Reader]) -> None:
+        """Name two images that glTF keeps in one and that lie differently on the surface."""
+        (first, one), (second, other) = readers.items()
+        if not one.placed_as(other):
+            self.lost.add(path, f"{first} and {second} placed differently", f"both are placed as {first} is; give both the same st, transform and wrap")
 
     def _single(self, reader: Reader, channel: int, path: str, name: str) -> int | None:
         """A texture with the reader's channel where glTF wants it."""
         if _plain_channel(reader.channel) and "rgba".index(reader.channel.output[0]) == channel:
-            return self.textures.copied(reader.channel.asset, path, reader.wrap)
+            return self.textures.copied(reader.channel, path, reader.wrap)
         return self.textures.packed({0: reader.channel, 1: reader.channel, 2: reader.channel}, path, reader.wrap, name)
 
     def _info(self, texture: int, reader: Reader) -> dict[str, Any]:
@@ -347,15 +298,29 @@ def _plain(colour: tuple[float, ...]) -> dict[str, Any]:
 
 def _rgb(channel: Channel) -> dict[int, Channel | float]:
     """Red, green and blue from the same image, as the output says."""
-    letters = "rgb" if channel.output == "rgb" else channel.output * 3
-    plain = (1.0,) * 4
-    # The scale stays in the factor, which is linear; the image is not.
-    return {i: Channel(channel.asset, c, plain, (0.0,) * 4) for i, c in enumerate(letters)}
+    return {i: replace(channel, output=c) for i, c in enumerate(_letters(channel))}
+
+
+def _letters(channel: Channel) -> str:
+    """The image's channels that red, green and blue come from."""
+    return "rgb" if channel.output == "rgb" else channel.output * 3
+
+
+def _factored(channel: Channel, highest: float) -> tuple[list[float], Channel]:
+    """The scale as glTF's colour factor, which may be up to `highest`, and what is then left to do to the image."""
+    used = ["rgba".index(c) for c in _letters(channel)]
+    if any(channel.bias[i] for i in used) or not all(0 <= channel.scale[i] <= highest for i in used):
+        return [1.0, 1.0, 1.0], channel
+    return [tidy(channel.scale[i]) for i in used], Channel(channel.asset, channel.output, space=channel.space)
+
+
+def _scaled(channel: Channel, factor: float) -> Channel:
+    return replace(channel, scale=tuple(x * factor for x in channel.scale), bias=tuple(x * factor for x in channel.bias))
 
 
 def _plain_channel(channel: Channel) -> bool:
-    c = "rgba".index(channel.output[0])
-    return abs(channel.scale[c] - 1) < 1e-6 and abs(channel.bias[c]) < 1e-6
+    """Whether nothing is done to the values of the file."""
+    return all(abs(channel.scale[c] - 1) < 1e-6 and abs(channel.bias[c]) < 1e-6 for c in map("rgba".index, channel.output))
 
 
 def _linked(shader: UsdShade.Shader, name: str) -> bool:

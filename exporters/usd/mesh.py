@@ -11,6 +11,7 @@ from ..common.report import Lost
 from .subdivide import INFINITE, Polygons, catmull_clark, smooth_normals
 
 _MAX_FACES = 4_000_000
+_PURPOSES = (UsdShade.Tokens.full, UsdShade.Tokens.allPurpose)
 
 
 @dataclass
@@ -57,9 +58,19 @@ def _array(attribute: Usd.Attribute, time: Usd.TimeCode, dtype: type) -> np.ndar
 
 
 def may_deform(prim: Usd.Prim) -> bool:
-    """Whether the points of a mesh move against it."""
+    """Whether the points or the faces of a mesh change."""
     mesh = UsdGeom.Mesh(prim)
-    return any(a.ValueMightBeTimeVarying() for a in (mesh.GetPointsAttr(), mesh.GetFaceVertexIndicesAttr(), mesh.GetNormalsAttr()))
+    moving = (mesh.GetPointsAttr(), mesh.GetNormalsAttr(), mesh.GetCreaseSharpnessesAttr(), mesh.GetCornerSharpnessesAttr())
+    return any(a.ValueMightBeTimeVarying() for a in (*moving, *_topology(mesh)))
+
+
+def faces_at(prim: Usd.Prim, time: Usd.TimeCode) -> tuple[bytes, ...]:
+    """What two times have to agree in for one to be a pose of the other."""
+    return tuple(_array(a, time, int).tobytes() for a in _topology(UsdGeom.Mesh(prim)))
+
+
+def _topology(mesh: UsdGeom.Mesh) -> tuple[Usd.Attribute, ...]:
+    return (mesh.GetFaceVertexCountsAttr(), mesh.GetFaceVertexIndicesAttr(), mesh.GetHoleIndicesAttr())
 
 
 def _polygons(mesh: UsdGeom.Mesh, time: Usd.TimeCode, levels: int, lost: Lost) -> tuple[Polygons | None, bool]:
@@ -218,9 +229,8 @@ def _subsets(mesh: UsdGeom.Mesh, polygons: Polygons, time: Usd.TimeCode, lost: L
             found.append((subset.GetPrim(), chosen))
             rest &= ~chosen
     for subset in UsdGeom.Subset.GetAllGeomSubsets(mesh):
-        if (
-            subset.GetFamilyNameAttr().Get() not in (UsdShade.Tokens.materialBind, None, "")
-            and UsdShade.MaterialBindingAPI(subset.GetPrim()).GetDirectBinding().GetMaterial()
+        if subset.GetFamilyNameAttr().Get() not in (UsdShade.Tokens.materialBind, None, "") and any(
+            UsdShade.MaterialBindingAPI(subset.GetPrim()).GetDirectBinding(p).GetMaterial() for p in _PURPOSES
         ):
             lost.add(str(subset.GetPath()), "GeomSubset outside the family materialBind", "set its familyName to materialBind")
     if rest.any():

@@ -12,8 +12,8 @@ from ..common.document import ARRAY_BUFFER, ELEMENT_ARRAY_BUFFER, Document
 from ..common.morph import choose_targets
 from ..common.report import Lost
 from .gprims import read_gprim
-from .materials import Materials
-from .mesh import Primitive, add_pose, may_deform, read_mesh
+from .materials import Materials, bound_material
+from .mesh import Primitive, add_pose, faces_at, may_deform, read_mesh
 
 _DISPLAY = (0.5, 0.5, 0.5, 1.0)
 
@@ -62,7 +62,7 @@ class Geometries:
     def _next(self, prim: Usd.Prim, kind: str, time: Usd.TimeCode, sample: int, known: list[int]) -> int | None:
         for number in reversed(known):
             item = self.items[number]
-            same = self._corners(prim, time) == self._corners(prim, item.prim_time)
+            same = faces_at(prim, time) == faces_at(prim, item.prim_time)
             if same and add_pose(item.primitives, prim, time, self.levels, self.lost):
                 item.samples.append(sample)
                 return number
@@ -80,18 +80,12 @@ class Geometries:
             if varying:
                 self.lost.add(str(prim.GetPath()), f"animated {', '.join(varying)}", "animate its scale instead; the first frame's is used")
             arrays = {"POSITION": shape.points.astype(np.float32), "NORMAL": shape.normals.astype(np.float32)}
-            arrays |= _constant_colour(prim, time, len(shape.points))
+            arrays |= self._constant_colour(prim, time, len(shape.points))
             primitive = Primitive(arrays, shape.indices.astype(np.uint32), prim, np.empty(0, int))
             item = Geometry(prim, time, [primitive], shape.placed, shape.implicit, [sample])
         self.items.append(item)
         known.append(len(self.items) - 1)
         return known[-1]
-
-    @staticmethod
-    def _corners(prim: Usd.Prim, time: Usd.TimeCode) -> tuple:
-        mesh = UsdGeom.Mesh(prim)
-        counts, corners = mesh.GetFaceVertexCountsAttr().Get(time), mesh.GetFaceVertexIndicesAttr().Get(time)
-        return (np.array(counts or []).tobytes(), np.array(corners or []).tobytes())
 
     def write(self, document: Document, materials: Materials, taken: np.ndarray) -> None:
         """Make the glTF meshes. `taken` holds the frame of each sample in the order in which they were taken."""
@@ -114,8 +108,9 @@ class Geometries:
             names = [k.removeprefix("st:") for k in p.attributes if k.startswith("st:")]
             plain, vertex_colours = _display(p)
             number, sets, display = materials.of(p.source, double, names, plain)
-            if display and vertex_colours is None and UsdShade.MaterialBindingAPI(p.source).ComputeBoundMaterial()[0]:
+            if display and vertex_colours is None and bound_material(p.source):
                 vertex_colours = np.tile(plain, (len(p.attributes["POSITION"]), 1))
+            self._name_animated(item.prim, [*sets, *(("displayColor", "displayOpacity") if display else ())])
             data: dict[str, Any] = {
                 "attributes": self._attributes(p, sets, vertex_colours if display else None, document),
                 "indices": document.add_accessor(_small(p.indices), ELEMENT_ARRAY_BUFFER),
@@ -137,6 +132,25 @@ class Geometries:
             if item.implicit not in shapes:
                 shapes.append(item.implicit)
             item.binding = {"shape": shapes.index(item.implicit), "material": primitives[0]["material"]}
+
+    def _constant_colour(self, prim: Usd.Prim, time: Usd.TimeCode, n: int) -> dict[str, np.ndarray]:
+        """Display colour and opacity of a gprim, its own or inherited: the first value for all of it."""
+        out = {}
+        for key, name in (("colour", "displayColor"), ("opacity", "displayOpacity")):
+            primvar = UsdGeom.PrimvarsAPI(prim).FindPrimvarWithInheritance(name)
+            values = np.array((primvar.ComputeFlattened(time) if primvar else None) or [], dtype=float).reshape(-1, 3 if key == "colour" else 1)
+            if len(values):
+                out[key] = np.tile(values[0], (n, 1))
+            if len(np.unique(values, axis=0)) > 1:
+                self.lost.add(str(prim.GetPath()), f"{name} that varies over a shape", "its first value is used; convert the shape to a mesh")
+        return out
+
+    def _name_animated(self, prim: Usd.Prim, names: list[str]) -> None:
+        """Name primvars that a picture would show changing: glTF's vertex attributes stay."""
+        for name in names:
+            primvar = UsdGeom.PrimvarsAPI(prim).FindPrimvarWithInheritance(name)
+            if primvar and _changes(primvar):
+                self.lost.add(str(prim.GetPath()), f"animated primvar {name}", "the first frame's values are used; bake it into a texture or cut the mesh up")
 
     def _attributes(self, p: Primitive, sets: list[str], colours: np.ndarray | None, document: Document) -> dict[str, int]:
         out = {"POSITION": document.add_accessor(p.attributes["POSITION"], ARRAY_BUFFER, limits=True)}
@@ -169,7 +183,7 @@ def _source(prim: Usd.Prim) -> tuple:
     """What makes two prims' geometry the same: the prim in the prototype and what is bound to it."""
     shared = prim.GetPrimInPrototype() if prim.IsInstanceProxy() else prim
     bound = [prim, *UsdShade.MaterialBindingAPI(prim).GetMaterialBindSubsets()]
-    paths = [str(UsdShade.MaterialBindingAPI(getattr(b, "GetPrim", lambda b=b: b)()).ComputeBoundMaterial()[0].GetPath()) for b in bound]
+    paths = [str(bound_material(getattr(b, "GetPrim", lambda b=b: b)()).GetPath()) for b in bound]
     return (str(shared.GetPath()), *paths)
 
 
@@ -193,14 +207,10 @@ def _display(p: Primitive) -> tuple[tuple[float, ...], np.ndarray | None]:
     return transparent, whole
 
 
-def _constant_colour(prim: Usd.Prim, time: Usd.TimeCode, n: int) -> dict[str, np.ndarray]:
-    """Display colour of a gprim: its first value for all of it."""
-    out = {}
-    for key, attribute in (("colour", UsdGeom.Gprim(prim).GetDisplayColorPrimvar()), ("opacity", UsdGeom.Gprim(prim).GetDisplayOpacityPrimvar())):
-        value = attribute.Get(time) if attribute else None
-        if value:
-            out[key] = np.tile(np.array(value[0], dtype=float).reshape(1, -1), (n, 1))
-    return out
+def _changes(primvar: UsdGeom.Primvar) -> bool:
+    """Whether a primvar ever has other values; many exporters write the same ones at every frame."""
+    times = primvar.GetTimeSamples() if primvar.ValueMightBeTimeVarying() else []
+    return any(primvar.ComputeFlattened(t) != primvar.ComputeFlattened(times[0]) for t in times[1:])
 
 
 def _small(indices: np.ndarray) -> np.ndarray:

@@ -9,7 +9,7 @@ from __future__ import annotations
 import hashlib
 import io
 import tempfile
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from urllib.parse import quote
 
@@ -22,16 +22,20 @@ from ..common.report import Lost
 
 _EXR_MAGIC = b"\x76\x2f\x31\x01"
 _DIRECT = {"PNG": ".png", "JPEG": ".jpg"}
+# Where a PNG says how many bits a channel has.
+_PNG_DEPTH = 24
+_ONE, _NOTHING = (1.0,) * 4, (0.0,) * 4
 
 
 @dataclass(frozen=True)
 class Channel:
-    """One channel (r, g, b, a) or all (rgb) of an asset, times scale plus bias."""
+    """One channel (r, g, b, a) or all (rgb) of an asset, made linear as `space` says, times scale plus bias."""
 
     asset: str
     output: str
-    scale: tuple[float, ...] = (1, 1, 1, 1)
-    bias: tuple[float, ...] = (0, 0, 0, 0)
+    scale: tuple[float, ...] = _ONE
+    bias: tuple[float, ...] = _NOTHING
+    space: str = "auto"
 
 
 def open_asset(resolved: str) -> bytes | None:
@@ -43,7 +47,7 @@ def open_asset(resolved: str) -> bytes | None:
 
 
 class Textures:
-    """Images of one export; each distinct content is written once."""
+    """Images of one export; each distinct content is written once. A `colour` is sRGB-coded in glTF, anything else is not."""
 
     def __init__(self, document: Document, target: Path, lost: Lost) -> None:
         self.document, self.target, self.lost = document, target, lost
@@ -61,44 +65,68 @@ class Textures:
         return self._raw[asset]
 
     def pixels(self, asset: str, path: str) -> np.ndarray | None:
-        """RGBA in 0-1 as stored (not linearised), rows from the top."""
+        """RGBA as stored (not linearised), rows from the top; whole numbers as 0-1."""
         if asset not in self._pixels:
             data = self.raw(asset, path)
             try:
                 if data and data[:4] == _EXR_MAGIC:
                     self._pixels[asset] = _exr_pixels(data)
-                    return self._pixels[asset]
-                image = Image.open(io.BytesIO(data)) if data else None
-                self._pixels[asset] = np.asarray(image.convert("RGBA"), dtype=np.float32) / 255 if image else None
+                else:
+                    self._pixels[asset] = _image_pixels(data) if data else None
             except (UnidentifiedImageError, OSError, ImportError, KeyError, RuntimeError):
                 self.lost.add(path, f"texture {asset} is in a format that cannot be read", "save it as PNG")
                 self._pixels[asset] = None
         return self._pixels[asset]
 
-    def copied(self, asset: str, path: str, wrap: tuple[int, int]) -> int | None:
-        """The glTF texture of an asset, unchanged where it is PNG or JPEG."""
-        data = self.raw(asset, path)
+    def _coded(self, channel: Channel, colour: bool) -> bool:
+        """Whether the file's values are sRGB-coded, by the rules of UsdUVTexture's sourceColorSpace.
+
+        Its `auto` would decode any 8-bit RGB image; for data nobody means that, and many exporters leave it at `auto`.
+        """
+        if channel.space != "auto":
+            return channel.space == "sRGB"
+        return colour and _eight_bit_colour(self._raw[channel.asset])
+
+    def _plane(self, channel: Channel, path: str, colour: bool) -> np.ndarray | None:
+        """One channel as a shader reads it: linear, scaled, biased."""
+        pixels = self.pixels(channel.asset, path)
+        if pixels is None:
+            return None
+        c = "rgba".index(channel.output[0])
+        values = _decoded(pixels[..., c]) if c < 3 and self._coded(channel, colour) else pixels[..., c]
+        return values * channel.scale[c] + channel.bias[c]
+
+    def top(self, channel: Channel, path: str) -> float:
+        """The largest value of a colour, at least 1."""
+        if channel.bias == _NOTHING and channel.scale == _ONE and _format(self.raw(channel.asset, path)) in _DIRECT:
+            return 1.0
+        planes = [self._plane(replace(channel, output=c), path, colour=True) for c in channel.output]
+        return max([1.0, *(float(p.max()) for p in planes if p is not None)])
+
+    def copied(self, channel: Channel, path: str, wrap: tuple[int, int], colour: bool = False) -> int | None:
+        """The glTF texture of a whole file, without the channel's scale and bias; unchanged where it is PNG or JPEG coded as glTF's are."""
+        data = self.raw(channel.asset, path)
         if data is None:
             return None
-        try:
-            kind = Image.open(io.BytesIO(data)).format
-        except (UnidentifiedImageError, OSError):
-            kind = None
-        if kind in _DIRECT:
-            return self._texture(data, _DIRECT[kind], asset, wrap)
-        pixels = self.pixels(asset, path)
-        return None if pixels is None else self._made(pixels, asset, wrap)
+        kind = _format(data)
+        if kind in _DIRECT and self._coded(channel, colour) == colour:
+            return self._texture(data, _DIRECT[kind], channel.asset, wrap)
+        return self.packed({i: Channel(channel.asset, c, space=channel.space) for i, c in enumerate("rgba")}, path, wrap, channel.asset, colour)
 
-    def packed(self, parts: dict[int, Channel | float], path: str, wrap: tuple[int, int], name: str) -> int | None:
+    def packed(self, parts: dict[int, Channel | float], path: str, wrap: tuple[int, int], name: str, colour: bool = False) -> int | None:
         """A new texture whose channel numbers 0-3 come from the channels or constants given; others are 1."""
         planes: dict[int, np.ndarray | float] = {}
         for number, part in parts.items():
             if isinstance(part, Channel):
-                pixels = self.pixels(part.asset, path)
-                if pixels is None:
+                # Alpha is no colour, whichever channel it comes from.
+                plane = self._plane(part, path, colour and number < 3)
+                if plane is None:
                     return None
-                c = "rgba".index(part.output[0])
-                planes[number] = np.clip(pixels[..., c] * part.scale[c] + part.bias[c], 0, 1)
+                if colour and number < 3:
+                    if plane.max() > 1.001:
+                        self.lost.add(path, f"colours over 1 in {Path(part.asset).name}", "they are cut off at 1; scale the image down")
+                    plane = _encoded(plane)
+                planes[number] = np.clip(plane, 0, 1)
             else:
                 planes[number] = part
         height = max(p.shape[0] for p in planes.values() if isinstance(p, np.ndarray))
@@ -110,13 +138,12 @@ class Textures:
 
     def normal(self, channel: Channel, path: str, wrap: tuple[int, int]) -> int | None:
         """A normal map brought to glTF's coding: colour * 2 - 1, green up."""
-        pixels = self.pixels(channel.asset, path)
-        if pixels is None:
+        planes = [self._plane(replace(channel, output=c), path, colour=False) for c in "rgb"]
+        if planes[0] is None:
             return None
-        n = pixels[..., :3] * np.array(channel.scale[:3]) + np.array(channel.bias[:3])
-        n /= np.maximum(np.linalg.norm(n, axis=2, keepdims=True), 1e-6)
-        out = np.ones_like(pixels)
-        out[..., :3] = n * 0.5 + 0.5
+        n = np.stack(planes, axis=2)
+        out = np.ones((*n.shape[:2], 4), dtype=np.float32)
+        out[..., :3] = n / np.maximum(np.linalg.norm(n, axis=2, keepdims=True), 1e-6) * 0.5 + 0.5
         return self._made(out, channel.asset, wrap)
 
     def _made(self, pixels: np.ndarray, name: str, wrap: tuple[int, int]) -> int:
@@ -153,8 +180,34 @@ class Textures:
         return self.document.append("images", {"name": base, "uri": quote(f"{folder}/{file}")})
 
 
+def _format(data: bytes | None) -> str | None:
+    """What Pillow calls a file's format; None for what it does not know."""
+    try:
+        return Image.open(io.BytesIO(data)).format if data else None
+    except (UnidentifiedImageError, OSError):
+        return None
+
+
+def _eight_bit_colour(data: bytes) -> bool:
+    """Whether a file has three or four channels of 8 bits."""
+    if _format(data) is None:
+        return False
+    deep = data[1:4] == b"PNG" and data[_PNG_DEPTH] == 16
+    return not deep and Image.open(io.BytesIO(data)).mode in ("RGB", "RGBA", "P", "CMYK", "YCbCr")
+
+
+def _image_pixels(data: bytes) -> np.ndarray:
+    """RGBA of what Pillow reads."""
+    image = Image.open(io.BytesIO(data))
+    if image.mode[0] not in "IF":
+        return np.asarray(image.convert("RGBA"), dtype=np.float32) / 255
+    # 16-bit and float greys, which Pillow would cut off at 255.
+    grey = np.asarray(image, dtype=np.float32) / (65535 if image.mode[0] == "I" else 1)
+    return np.stack([grey, grey, grey, np.ones_like(grey)], axis=2)
+
+
 def _exr_pixels(data: bytes) -> np.ndarray:
-    """An OpenEXR image, which is linear, as sRGB-encoded RGBA in 0-1; what is over 1 is cut off."""
+    """RGBA of an OpenEXR image."""
     import OpenEXR
 
     with tempfile.NamedTemporaryFile(suffix=".exr") as file:
@@ -165,11 +218,18 @@ def _exr_pixels(data: bytes) -> np.ndarray:
     first = channels.get("R", channels.get("Y"))
     if first is None:
         raise KeyError("R")
-    rgb = np.stack([channels.get(c, first) for c in "RGB"], axis=2)
-    rgb = np.clip(rgb, 0, 1)
-    encoded = np.where(rgb <= 0.0031308, rgb * 12.92, 1.055 * np.maximum(rgb, 1e-9) ** (1 / 2.4) - 0.055)
-    alpha = channels.get("A", np.ones_like(first))
-    return np.concatenate([encoded, np.clip(alpha, 0, 1)[..., None]], axis=2).astype(np.float32)
+    planes = [*(channels.get(c, first) for c in "RGB"), channels.get("A", np.ones_like(first))]
+    return np.nan_to_num(np.stack(planes, axis=2))
+
+
+def _encoded(linear: np.ndarray) -> np.ndarray:
+    """Linear to sRGB."""
+    return np.where(linear <= 0.0031308, linear * 12.92, 1.055 * np.maximum(linear, 1e-9) ** (1 / 2.4) - 0.055)
+
+
+def _decoded(coded: np.ndarray) -> np.ndarray:
+    """sRGB to linear."""
+    return np.where(coded <= 0.04045, coded / 12.92, ((np.maximum(coded, 0) + 0.055) / 1.055) ** 2.4)
 
 
 def _resized(plane: np.ndarray, width: int, height: int) -> np.ndarray:

@@ -55,7 +55,7 @@ def main(argv: list[str]) -> int:
     parser.add_argument("output", type=Path, help="where to write: .gltf or .glb")
     parser.add_argument("--camera", help="prim path or name of the camera (render settings', else the first animated one)")
     parser.add_argument("--variant", type=_variant, action="append", default=[], metavar="[/prim:]SET=VALUE", help="choose a variant; repeatable")
-    parser.add_argument("--frames", type=_pair("-"), help="FIRST-LAST time codes (the stage's)")
+    parser.add_argument("--frames", type=_pair("-"), help="FIRST-LAST frames (the stage's)")
     parser.add_argument("--resolution", type=_pair("x"), help="WIDTHxHEIGHT (the render settings')")
     parser.add_argument("--subdivision", type=int, default=2, help="levels for subdivision meshes, 0: the cage (2)")
     parser.add_argument("--no-camera-light", action="store_true", help="leave a stage without lights dark")

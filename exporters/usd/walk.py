@@ -47,39 +47,50 @@ class Walker:
         """Prims under `root` with their kinds; what is below a PointInstancer is its prototypes, not drawn where it is."""
         walk = iter(Usd.PrimRange(root, Usd.TraverseInstanceProxies(Usd.PrimIsActive & Usd.PrimIsLoaded & ~Usd.PrimIsAbstract)))
         for prim in walk:
-            kind = self._kind(prim)
-            if kind == "instancer":
+            if prim.IsA(UsdGeom.PointInstancer):
                 walk.PruneChildren()
+            kind = self._kind(prim)
             if kind and (prim.IsDefined() or root != self.stage.GetPseudoRoot()):
                 yield kind, prim
 
     def _kind(self, prim: Usd.Prim) -> str | None:
         name = prim.GetTypeName()
-        if prim.IsA(UsdGeom.PointInstancer):
-            return "instancer"
         if prim.IsA(UsdGeom.Camera):
             return "camera"
         if is_dome(prim):
             return "dome"
         if is_light(prim) and not prim.IsA(UsdGeom.Mesh):
             return "light"
-        shape = "mesh" if prim.IsA(UsdGeom.Mesh) else "gprim" if is_gprim(prim) else None
+        kinds = {"mesh": prim.IsA(UsdGeom.Mesh), "instancer": prim.IsA(UsdGeom.PointInstancer), "gprim": is_gprim(prim)}
+        shape = next((kind for kind, so in kinds.items() if so), None)
         if shape or name in _NAMED:
-            if UsdGeom.Imageable(prim).ComputePurpose() not in _PURPOSES:
+            purpose = UsdGeom.Imageable(prim).ComputePurpose()
+            if purpose not in _PURPOSES:
                 return None
+            if purpose != UsdGeom.Tokens.render and prim.GetAttribute("renderVisibility").Get() == UsdGeom.Tokens.invisible:
+                self.lost.add(str(prim.GetPath()), "renderVisibility without purpose render", "USD heeds it for that purpose only: it is drawn; set visibility")
             if name in _NAMED:
                 self.lost.add(str(prim.GetPath()), str(name), f"it is left out; {_NAMED[name]}")
                 return None
             if prim.HasAPI("MeshLightAPI"):
                 self.lost.add(str(prim.GetPath()), "mesh light", "it does not shine; give it an emissive material and add a rect light")
+            if shape == "instancer":
+                self._name_colours(prim)
         return shape
+
+    def _name_colours(self, prim: Usd.Prim) -> None:
+        """Name what colours each instance on its own."""
+        for name in ("displayColor", "displayOpacity"):
+            primvar = UsdGeom.PrimvarsAPI(prim).GetPrimvar(name)
+            if primvar.HasAuthoredValue() and primvar.GetInterpolation() != UsdGeom.Tokens.constant:
+                self.lost.add(str(prim.GetPath()), f"{name} of each instance", "instances look as their prototype; make one prototype for each colour")
 
     def at(self, time: Usd.TimeCode) -> Iterator[Found]:
         """Everything at a time; matrices are columns-as-axes, in stage units."""
         cache = UsdGeom.XformCache(time)
         for kind, prim in self.prims:
             matrix = column(cache.GetLocalToWorldTransform(prim))
-            visible = UsdGeom.Imageable(prim).ComputeVisibility(time) != UsdGeom.Tokens.invisible
+            visible = _visible(UsdGeom.Imageable(prim), time)
             if kind == "instancer":
                 yield from self._instances(prim, matrix, visible, (str(prim.GetPath()),), time, cache, 0)
             else:
@@ -123,6 +134,13 @@ class Walker:
                     yield from self._instances(below, local, seen, whole, time, cache, depth + 1)
                 elif kind not in ("camera", "dome"):
                     yield Found(whole, kind, below, local, seen)
+
+
+def _visible(imageable: UsdGeom.Imageable, time: Usd.TimeCode) -> bool:
+    """Visibility, and for what is there for final pictures only also its `renderVisibility`."""
+    final = imageable.ComputePurpose() == UsdGeom.Tokens.render
+    purpose = UsdGeom.Tokens.render if final else UsdGeom.Tokens.default_
+    return imageable.ComputeEffectiveVisibility(purpose, time) != UsdGeom.Tokens.invisible
 
 
 def _shown_below(prim: Usd.Prim, root: Usd.Prim, time: Usd.TimeCode) -> bool:

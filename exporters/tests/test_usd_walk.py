@@ -1,0 +1,124 @@
+"""What of a USD stage is drawn, and where: visibility, purposes, instances, references."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+pytest.importorskip("pxr", reason="SKIPPED LOUDLY: usd-core is not installed (pip install usd-core)")
+import usd_scene as u
+from pxr import Sdf, Usd, UsdGeom
+
+
+def named(gltf, name):
+    """All nodes with a name."""
+    return [i for i, n in enumerate(gltf.root["nodes"]) if n["name"] == name]
+
+
+def test_render_visibility(usd_convert):
+    """It is heeded for purpose render, from the nearest prim that has it; elsewhere it means nothing and is named."""
+    made = u.stage()
+    u.camera(made)
+    group = UsdGeom.Xform.Define(made, "/World/Group")
+    UsdGeom.VisibilityAPI.Apply(group.GetPrim()).CreateRenderVisibilityAttr("invisible")
+    for name, purpose in (("Hidden", "render"), ("Plain", "default")):
+        UsdGeom.Imageable(u.quad(made, f"/World/Group/{name}")).CreatePurposeAttr(purpose)
+    UsdGeom.VisibilityAPI.Apply(u.quad(made, "/World/Vain").GetPrim()).CreateRenderVisibilityAttr("invisible")
+    gltf = usd_convert(made)
+    names = {n["name"] for n in gltf.root["nodes"]}
+    assert "Hidden" not in names
+    assert {"Plain", "Vain"} <= names
+    assert gltf.lost_features("/World/Vain") == ["renderVisibility without purpose render"]
+
+
+def test_purpose_and_colours_of_point_instancers(usd_convert):
+    made = u.stage()
+    u.camera(made)
+    for name, purpose in (("Guide", "guide"), ("Drawn", "default")):
+        instancer = UsdGeom.PointInstancer.Define(made, f"/World/{name}")
+        instancer.CreatePurposeAttr(purpose)
+        u.quad(made, f"/World/{name}/Protos/{name}Card")
+        instancer.CreatePrototypesRel().SetTargets([f"/World/{name}/Protos/{name}Card"])
+        instancer.CreateProtoIndicesAttr([0, 0])
+        instancer.CreatePositionsAttr([(0, 0, 0), (3, 0, 0)])
+        UsdGeom.PrimvarsAPI(instancer).CreatePrimvar("displayColor", Sdf.ValueTypeNames.Color3fArray, "vertex").Set([(1, 0, 0), (0, 1, 0)])
+    gltf = usd_convert(made)
+    assert (len(named(gltf, "GuideCard")), len(named(gltf, "DrawnCard"))) == (0, 2)
+    assert gltf.lost_features("/World/Drawn") == ["displayColor of each instance"]
+    assert not gltf.lost_features("/World/Guide")
+
+
+def test_visibility_and_purpose(usd_convert):
+    made = u.stage()
+    u.camera(made)
+    group = UsdGeom.Xform.Define(made, "/World/Group")
+    u.quad(made, "/World/Group/Blink")
+    group.CreateVisibilityAttr().Set("inherited", 1)
+    group.GetVisibilityAttr().Set("invisible", 3)
+    for purpose in ("proxy", "guide", "render"):
+        UsdGeom.Imageable(u.quad(made, f"/World/{purpose}")).CreatePurposeAttr(purpose)
+    gltf = usd_convert(made)
+    assert [gltf.visible(gltf.node("Blink"), f) for f in (1, 2, 3, 5)] == [True, True, False, False]
+    names = {n["name"] for n in gltf.root["nodes"]}
+    assert "render" in names
+    assert not names & {"proxy", "guide"}
+
+
+def test_point_instancer(usd_convert):
+    made = u.stage(frames=(1, 2))
+    u.camera(made)
+    instancer = UsdGeom.PointInstancer.Define(made, "/World/Many")
+    box = u.cube(made, "/World/Many/Protos/Box")
+    UsdGeom.XformCommonAPI(box).SetScale((2, 2, 2))
+    UsdGeom.Xform.Define(made, "/World/Many/Protos/Pair")
+    UsdGeom.XformCommonAPI(u.quad(made, "/World/Many/Protos/Pair/Card")).SetTranslate((0, 1, 0))
+    instancer.CreatePrototypesRel().SetTargets(["/World/Many/Protos/Box", "/World/Many/Protos/Pair"])
+    instancer.CreateProtoIndicesAttr([0, 1, 0])
+    instancer.CreateIdsAttr([7, 8, 9])
+    instancer.CreatePositionsAttr().Set([(0, 0, 0), (5, 0, 0), (9, 0, 0)], 1)
+    instancer.GetPositionsAttr().Set([(0, 0, 0), (5, 0, 3), (9, 0, 0)], 2)
+    instancer.CreateInvisibleIdsAttr().Set([], 1)
+    instancer.GetInvisibleIdsAttr().Set([9], 2)
+    gltf = usd_convert(made)
+    boxes, cards = named(gltf, "Box"), named(gltf, "Card")
+    assert (len(boxes), len(cards)) == (2, 1)
+    assert len({gltf.root["nodes"][n]["mesh"] for n in boxes}) == 1
+    assert gltf.world(boxes[0], 1)[0, 0] == pytest.approx(2)
+    np.testing.assert_allclose(gltf.world(cards[0], 2)[:3, 3], (5, 1, 3), atol=1e-6)
+    assert [gltf.visible(boxes[1], f) for f in (1, 2)] == [True, False]
+
+
+def test_native_instances_references_payloads_and_variants(usd_convert, tmp_path):
+    asset = Usd.Stage.CreateNew(str(tmp_path / "asset.usda"))
+    root = UsdGeom.Xform.Define(asset, "/Asset")
+    asset.SetDefaultPrim(root.GetPrim())
+    shapes = root.GetPrim().GetVariantSets().AddVariantSet("shape")
+    for name in ("card", "box"):
+        shapes.AddVariant(name)
+        shapes.SetVariantSelection(name)
+        with shapes.GetVariantEditContext():
+            (u.quad if name == "card" else u.cube)(asset, "/Asset/Geo")
+    shapes.SetVariantSelection("card")
+    asset.Save()
+    made = u.stage()
+    u.camera(made)
+    for i in range(3):
+        prim = UsdGeom.Xform.Define(made, f"/World/I{i}")
+        (prim.GetPrim().GetReferences().AddReference if i else prim.GetPrim().GetPayloads().AddPayload)("asset.usda")
+        prim.GetPrim().SetInstanceable(True)
+        UsdGeom.XformCommonAPI(prim).SetTranslate((2.0 * i, 0, 0))
+    gltf = usd_convert(made)
+    nodes = named(gltf, "Geo")
+    assert [round(gltf.world(n, 1)[0, 3]) for n in nodes] == [0, 2, 4]
+    assert [len(gltf.triangles(n)) for n in nodes] == [2, 2, 2]
+    assert len({gltf.root["nodes"][n]["mesh"] for n in nodes[1:]}) == 1, "instances of one prototype share their mesh"
+    boxed = usd_convert(made, variants=[("", "shape", "box")])
+    assert [len(boxed.triangles(n)) for n in named(boxed, "Geo")] == [12] * 3
+
+
+def test_missing_references_are_named(usd_convert):
+    made = u.stage()
+    u.camera(made)
+    UsdGeom.Xform.Define(made, "/World/Gone").GetPrim().GetReferences().AddReference("gone.usda")
+    gltf = usd_convert(made)
+    assert any("composition" in i["feature"] and "gone.usda" in i["feature"] for i in gltf.lost.items)
