@@ -1,32 +1,35 @@
-"""Bakes procedural base colours to image textures, which is the only form that glTF holds them in.
+"""Bakes procedural inputs of materials to image textures, which is the only form that glTF holds them in.
 
 Works on the temporary export scene: each mesh there is a copy, so UV maps and materials can be added freely.
 """
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable
 
 import bpy
+import numpy as np
 
-from .materials import procedural_inputs
+from .materials import PLACED, make_plain, output_of
+from .nodes import PAIRS, placed, unreadable_inputs
 
 _UV = "buzz-bake"
 # Only what is a colour or a value of the surface itself; a normal cannot be baked through an emission shader.
-_BAKED = ("Base Color", "Roughness", "Metallic", "Emission Color")
-_DATA = ("Roughness", "Metallic")
+_COLOURS = ("Base Color", "Emission Color")
+# Values, and the channel that glTF reads each from; Blender's exporter wants to see it in the nodes.
+_VALUES = {"Metallic": "Blue", "Roughness": "Green", "Alpha": "Red", "Transmission Weight": "Red", "Coat Weight": "Red", "Coat Roughness": "Green"}
 
 
 def bake_procedural(scene: bpy.types.Scene, size: int, progress: Callable[[str], None]) -> None:
     """Replace procedural inputs of Principled materials by baked images, on every mesh of the scene that has them."""
-    jobs = []
-    for ob in scene.collection.objects:
-        for slot in ob.material_slots:
-            inputs = _to_bake(slot.material)
-            if inputs:
-                jobs.append((ob, slot, inputs))
+    slots = [(ob, slot) for ob in scene.collection.objects for slot in ob.material_slots if slot.material is not None and slot.material.use_nodes]
+    for material in {slot.material for _, slot in slots}:
+        make_plain(material.node_tree)
+    jobs = [(ob, slot, inputs) for ob, slot in slots if (inputs := _to_bake(ob, slot.material))]
     if not jobs:
         return
+    users = Counter(slot.material for _, slot in slots)
     scene.render.engine = "CYCLES"
     scene.cycles.samples = 1
     scene.cycles.use_denoising = False
@@ -34,22 +37,30 @@ def bake_procedural(scene: bpy.types.Scene, size: int, progress: Callable[[str],
     for ob, slot, inputs in jobs:
         progress(f"baking {slot.material.name}: {', '.join(inputs).lower()}")
         _unwrap(scene, ob)
-        slot.material = slot.material.copy()
+        if users[slot.material] > 1:
+            slot.material = slot.material.copy()
         for name in inputs:
             _bake_input(scene, ob, slot, name, size)
 
 
-def _to_bake(material: bpy.types.Material | None) -> list[str]:
-    tree = material.node_tree if material is not None and material.use_nodes else None
-    shader = _principled(tree) if tree else None
-    return [name for name in _BAKED if name in procedural_inputs(shader)] if shader else []
+def _to_bake(ob: bpy.types.Object, material: bpy.types.Material) -> list[str]:
+    """Inputs that have to be baked on an object, for what Blender's exporter reads of their nodes is not what they show."""
+    shader = _principled(material.node_tree)
+    if shader is None:
+        return []
+    found = set(unreadable_inputs(shader, [ob.data]))
+    if "Emission Strength" in found:
+        # An emission is baked as a whole.
+        found.add("Emission Color")
+    for pair in PAIRS:
+        if found & set(pair):
+            # One texture in one place holds both.
+            found |= {name for name in pair if shader.inputs[name].is_linked}
+    return [name for name in (*_COLOURS, *_VALUES) if name in found]
 
 
 def _principled(tree: bpy.types.NodeTree) -> bpy.types.Node | None:
-    output = tree.get_output_node("ALL") or tree.get_output_node("CYCLES")
-    if output is None or not output.inputs["Surface"].is_linked:
-        return None
-    node = output.inputs["Surface"].links[0].from_node
+    node = output_of(tree).inputs["Surface"].links[0].from_node
     return node if node.type == "BSDF_PRINCIPLED" else None
 
 
@@ -83,20 +94,49 @@ def _bake_input(scene: bpy.types.Scene, ob: bpy.types.Object, slot: bpy.types.Ma
     material = slot.material
     tree = material.node_tree
     shader = _principled(tree)
-    output = tree.get_output_node("ALL") or tree.get_output_node("CYCLES")
-    image = bpy.data.images.new(f"{material.name} {name}", size, size, alpha=False)
-    if name in _DATA:
-        image.colorspace_settings.name = "Non-Color"
+    output = output_of(tree)
+    socket = shader.inputs[name]
     texture = tree.nodes.new("ShaderNodeTexImage")
-    texture.image = image
+    # An emission may be brighter than an image can hold.
+    texture.image = bpy.data.images.new(f"{material.name}-{name.replace(' ', '')}", size, size, alpha=False, float_buffer=name == "Emission Color")
+    if name in _VALUES:
+        texture.image.colorspace_settings.name = "Non-Color"
     uv = tree.nodes.new("ShaderNodeUVMap")
     uv.uv_map = _UV
     tree.links.new(uv.outputs["UV"], texture.inputs["Vector"])
     emission = tree.nodes.new("ShaderNodeEmission")
-    socket = shader.inputs[name]
-    tree.links.new(socket.links[0].from_socket, emission.inputs["Color"])
+    _move(tree, socket, emission.inputs["Color"])
+    if name == "Emission Color":
+        _move(tree, shader.inputs["Emission Strength"], emission.inputs["Strength"])
+    if what := placed(emission.inputs["Color"]) or placed(emission.inputs["Strength"]):
+        texture[PLACED] = what
     tree.links.new(emission.outputs[0], output.inputs["Surface"])
     tree.nodes.active = texture
+    _bake(scene, ob, slot)
+    tree.nodes.remove(emission)
+    tree.links.new(shader.outputs[0], output.inputs["Surface"])
+    if name == "Emission Color":
+        texture.image, shader.inputs["Emission Strength"].default_value = _within_one(texture.image)
+    texture.image.pack()
+    if name in _VALUES:
+        split = tree.nodes.new("ShaderNodeSeparateColor")
+        tree.links.new(texture.outputs["Color"], split.inputs["Color"])
+        tree.links.new(split.outputs[_VALUES[name]], socket)
+    else:
+        tree.links.new(texture.outputs["Color"], socket)
+
+
+def _move(tree: bpy.types.NodeTree, old: bpy.types.NodeSocket, new: bpy.types.NodeSocket) -> None:
+    """Give an input what another one is linked to, or its constant."""
+    if old.is_linked:
+        tree.links.new(old.links[0].from_socket, new)
+        tree.links.remove(old.links[0])
+    else:
+        new.default_value = old.default_value
+
+
+def _bake(scene: bpy.types.Scene, ob: bpy.types.Object, slot: bpy.types.MaterialSlot) -> None:
+    """Bake what the object emits into the active image of the slot's material."""
     others = []
     for other in ob.material_slots:
         # Every material of the object needs an active image, or Blender refuses to bake.
@@ -112,13 +152,17 @@ def _bake_input(scene: bpy.types.Scene, ob: bpy.types.Object, slot: bpy.types.Ma
     for nodes, spare, active in others:
         nodes.remove(spare)
         nodes.active = active
-    image.pack()
-    tree.nodes.remove(emission)
-    tree.links.new(shader.outputs[0], output.inputs["Surface"])
-    if name in _DATA:
-        # glTF reads metallic from blue and roughness from green; Blender's exporter wants to see that in the nodes.
-        split = tree.nodes.new("ShaderNodeSeparateColor")
-        tree.links.new(texture.outputs["Color"], split.inputs["Color"])
-        tree.links.new(split.outputs["Green" if name == "Roughness" else "Blue"], socket)
-    else:
-        tree.links.new(texture.outputs["Color"], socket)
+
+
+def _within_one(bright: bpy.types.Image) -> tuple[bpy.types.Image, float]:
+    """An image of what glTF's 8 bits hold, and the factor that brings it back."""
+    pixels = np.empty(len(bright.pixels), dtype=np.float32)
+    bright.pixels.foreach_get(pixels)
+    pixels = pixels.reshape(-1, bright.channels)
+    colours = np.clip(pixels[:, :3], 0.0, None)
+    factor = float(colours.max()) or 1.0
+    colours = colours / factor
+    pixels[:, :3] = np.where(colours <= 0.0031308, 12.92 * colours, 1.055 * colours ** (1 / 2.4) - 0.055)
+    image = bpy.data.images.new(bright.name, *bright.size, alpha=False)
+    image.pixels.foreach_set(pixels.reshape(-1))
+    return image, factor

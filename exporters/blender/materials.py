@@ -1,7 +1,7 @@
 """What of a material glTF can hold; the rest is rebuilt as Principled where that is plain, or named.
 
-Blender's exporter reads a Principled BSDF, image textures, colour attributes and constants; anything else it drops or
-turns white without a word.
+Blender's exporter reads a Principled BSDF, image textures, colour attributes and constants (see nodes.py); anything else
+it drops or turns white without a word.
 """
 
 from __future__ import annotations
@@ -9,16 +9,14 @@ from __future__ import annotations
 import os
 
 import bpy
+import numpy as np
 
 from ..common.report import Lost
+from .nodes import CONSTANTS, NORMALS, source, trees, unreadable_inputs, upstream
 from .prepare import is_animated
 
-# Node types through which Blender's exporter finds its way to an image, a colour attribute or a constant.
-_READABLE = {
-    "TEX_IMAGE", "RGB", "VALUE", "VERTEX_COLOR", "ATTRIBUTE", "UVMAP", "TEX_COORD", "MAPPING", "NORMAL_MAP",
-    "SEPARATE_COLOR", "SEPRGB", "COMBINE_COLOR", "REROUTE", "MIX", "MIX_RGB", "MATH", "FRAME",
-}  # fmt: skip
-_INPUTS = ("Base Color", "Metallic", "Roughness", "Alpha", "Normal", "Emission Color", "Transmission Weight", "Coat Weight", "Coat Roughness")
+# The property of a baked image's node that says what in it depends on the object's place or the view.
+PLACED = "placed"
 _DROPPED = {"Subsurface Weight": "subsurface scattering", "Thin Film Thickness": "thin film"}
 
 
@@ -28,42 +26,117 @@ def prepare_materials(materials: list[bpy.types.Material], lost: Lost) -> None:
         tree = material.node_tree if material.use_nodes else None
         if tree is None:
             continue
-        if is_animated(material) or is_animated(tree):
+        if any(is_animated(each) for each in (material, *trees(tree))):
             lost.add(material.name, "animated material", "the values of the first frame are used")
-        _drop_broken_groups(tree, material.name, lost)
-        _name_missing_images(tree, material.name, lost)
-        output = tree.get_output_node("ALL") or tree.get_output_node("CYCLES")
-        if output is None or not output.inputs["Surface"].is_linked:
-            continue
-        if output.inputs["Displacement"].is_linked and _upstream(output.inputs["Displacement"]):
+        for each in trees(tree):
+            # Blender's exporter goes to a frame of its own.
+            each.animation_data_clear()
+            _drop_broken_groups(each, material.name, lost)
+            _hold_movies(each, material.name, lost)
+            _name_missing_images(each, material.name, lost)
+        make_plain(tree)
+        output = output_of(tree)
+        if output.inputs["Displacement"].is_linked and source(output.inputs["Displacement"]):
             lost.add(material.name, "displacement", "apply it to the mesh (Displace modifier) or bake a normal map")
         if output.inputs["Volume"].is_linked:
             lost.add(material.name, "volume shader", "only Principled transmission is carried; render the volume separately")
         shader = output.inputs["Surface"].links[0].from_node
         if shader.type != "BSDF_PRINCIPLED":
-            shader = _rebuild(tree, output, shader, material.name, lost)
-        if shader is not None and shader.type == "BSDF_PRINCIPLED":
-            _name_losses(shader, material.name, lost)
+            shader = _choose_principled(tree, output, shader, material.name, lost)
+        if shader is not None:
+            _name_losses(shader, meshes_of(material), material.name, lost)
 
 
-def procedural_inputs(shader: bpy.types.Node) -> dict[str, str]:
-    """Inputs of a Principled BSDF that hang on something glTF cannot hold: input name -> type of the node."""
-    found = {}
-    for name in _INPUTS:
-        socket = shader.inputs.get(name)
-        if socket is not None and socket.is_linked:
-            bad = [n.type for n in _upstream(socket) if n.type not in _READABLE]
-            if bad:
-                found[name] = bad[0]
-    return found
+def make_plain(tree: bpy.types.NodeTree) -> None:
+    """Rebuild with a Principled BSDF what looks the same with one; called before baking, and again where that is off."""
+    for link in [link for link in tree.links if link.is_muted]:
+        tree.links.remove(link)
+    surface = output_of(tree).inputs["Surface"]
+    old = surface.links[0].from_node if surface.is_linked else None
+    settings = _as_principled(tree, old)
+    if settings is not None:
+        new = tree.nodes.new("ShaderNodeBsdfPrincipled")
+        for key, value in settings.items():
+            if not isinstance(value, bpy.types.NodeSocket):
+                new.inputs[key].default_value = value
+            elif value.is_linked:
+                tree.links.new(value.links[0].from_socket, new.inputs[key])
+            elif value.type != "VECTOR":
+                new.inputs[key].default_value = value.default_value
+        tree.links.new(new.outputs[0], surface)
+    if surface.links[0].from_node.type == "BSDF_PRINCIPLED":
+        _fold_constants(tree, surface.links[0].from_node)
 
 
-def _name_losses(shader: bpy.types.Node, name: str, lost: Lost) -> None:
-    for socket, kind in procedural_inputs(shader).items():
-        label = kind.replace("TEX_", "").replace("_", " ").lower()
-        lost.add(name, f"procedural {socket.lower()} ({label} node)", "bake it to an image texture; until then a constant is used")
-    for socket, label in _DROPPED.items():
-        value = shader.inputs.get(socket)
+def output_of(tree: bpy.types.NodeTree) -> bpy.types.Node:
+    """The material output that is rendered; a new one, where Blender renders black for want of one."""
+    return tree.get_output_node("ALL") or tree.get_output_node("CYCLES") or tree.nodes.new("ShaderNodeOutputMaterial")
+
+
+def meshes_of(material: bpy.types.Material) -> list[bpy.types.Mesh]:
+    """The meshes of the export scene that show a material."""
+    return [ob.data for ob in bpy.context.scene.objects if any(slot.material == material for slot in ob.material_slots)]
+
+
+def _as_principled(tree: bpy.types.NodeTree, shader: bpy.types.Node | None) -> dict | None:
+    """Settings of a Principled BSDF that looks like another plain shader: values, or inputs to copy. None if there are none."""
+    black = {"Base Color": (0, 0, 0, 1), "Roughness": 1.0, "Specular IOR Level": 0.0}
+    if shader is None:
+        # A surface of nothing is black in Blender, but not there around a volume.
+        return {**black, "Alpha": 0.0} if output_of(tree).inputs["Volume"].is_linked else black
+    inputs = shader.inputs
+    if shader.type == "BSDF_DIFFUSE":
+        return {"Base Color": inputs["Color"], "Normal": inputs["Normal"], "Roughness": 1.0, "Specular IOR Level": 0.0}
+    if shader.type in ("BSDF_GLOSSY", "BSDF_ANISOTROPIC"):
+        return {"Base Color": inputs["Color"], "Roughness": inputs["Roughness"], "Normal": inputs["Normal"], "Metallic": 1.0}
+    if shader.type in ("BSDF_GLASS", "BSDF_REFRACTION"):
+        copied = {"Base Color": inputs["Color"], "Roughness": inputs["Roughness"], "IOR": inputs["IOR"], "Normal": inputs["Normal"]}
+        return {**copied, "Transmission Weight": 1.0}
+    if shader.type == "EMISSION":
+        return {**black, "Emission Color": inputs["Color"], "Emission Strength": inputs["Strength"]}
+    if shader.type == "BSDF_TRANSPARENT" and not inputs["Color"].is_linked and min(inputs["Color"].default_value) == 1:
+        return {**black, "Alpha": 0.0}
+    return None
+
+
+def _fold_constants(tree: bpy.types.NodeTree, shader: bpy.types.Node) -> None:
+    """Put values of constant nodes into the inputs themselves, where Blender's exporter always sees them."""
+    for socket in shader.inputs:
+        out = source(socket)
+        if out is None or {"RGB": "RGBA", "VALUE": "VALUE"}.get(out.node.type) != socket.type:
+            continue
+        socket.default_value = out.default_value
+        tree.links.remove(socket.links[0])
+
+
+def _choose_principled(tree, output, shader, name: str, lost: Lost) -> bpy.types.Node | None:
+    """The Principled BSDF that stands for a mixture of shaders."""
+    lost.add(name, f"{shader.bl_label or shader.type} shader", "use a Principled BSDF, directly under the output")
+    nodes = [out.node for out in upstream(output.inputs["Surface"])]
+    chosen = next((n for n in nodes if n.type == "BSDF_PRINCIPLED" and n.id_data == tree), None)
+    if chosen is not None:
+        tree.links.new(chosen.outputs[0], output.inputs["Surface"])
+        _fold_constants(tree, chosen)
+    return chosen
+
+
+def _name_losses(shader: bpy.types.Node, meshes: list[bpy.types.Mesh], name: str, lost: Lost) -> None:
+    for key, reason in unreadable_inputs(shader, meshes).items():
+        socket = shader.inputs[key]
+        images = [out.node.image for out in upstream(socket) if out.node.type == "TEX_IMAGE" and out.node.image is not None]
+        if key not in NORMALS + CONSTANTS and images and all(image.source != "TILED" for image in images):
+            remains = "the image alone is used"
+        else:
+            # What the exporter would make of it is worse than to go without, or stops it.
+            shader.id_data.links.remove(socket.links[0])
+            remains = "it is left out" if key in NORMALS else "a constant is used"
+        lost.add(name, f"procedural {key.lower()} ({reason})", f"bake it to an image texture; until then {remains}")
+    for socket in shader.inputs:
+        for what in {out.node[PLACED] for out in upstream(socket) if PLACED in out.node}:
+            feature = f"{socket.name.lower()} that depends on the object's place or the view ({what})"
+            lost.add(name, feature, "it is baked once, for an object at the origin; bake each object by itself")
+    for key, label in _DROPPED.items():
+        value = shader.inputs.get(key)
         if value is not None and (value.is_linked or value.default_value > 0):
             lost.add(name, label, "it is rendered as without it")
 
@@ -77,6 +150,31 @@ def _drop_broken_groups(tree: bpy.types.NodeTree, name: str, lost: Lost) -> None
             tree.nodes.remove(node)
 
 
+def _hold_movies(tree: bpy.types.NodeTree, name: str, lost: Lost) -> None:
+    """Replace movies by stills of their first frame: Blender's exporter leaves them out."""
+    for node in tree.nodes:
+        if node.type != "TEX_IMAGE" or node.image is None or node.image.source not in ("SEQUENCE", "MOVIE"):
+            continue
+        lost.add(name, f"image {node.image.name!r} is a movie", "its first frame is used for the whole shot")
+        node.image = _still(node.image)
+
+
+def _still(movie: bpy.types.Image) -> bpy.types.Image:
+    """The first frame of a movie or image sequence."""
+    if movie.source == "SEQUENCE":
+        # The file that was chosen for a sequence is its first.
+        still = movie.copy()
+        still.source = "FILE"
+        return still
+    still = bpy.data.images.new(movie.name, *movie.size)
+    still.colorspace_settings.name = movie.colorspace_settings.name
+    pixels = np.empty(len(movie.pixels), dtype=np.float32)
+    movie.pixels.foreach_get(pixels)
+    still.pixels.foreach_set(pixels)
+    still.pack()
+    return still
+
+
 def _name_missing_images(tree: bpy.types.NodeTree, name: str, lost: Lost) -> None:
     for node in tree.nodes:
         if node.type != "TEX_IMAGE" or node.image is None:
@@ -84,50 +182,3 @@ def _name_missing_images(tree: bpy.types.NodeTree, name: str, lost: Lost) -> Non
         image = node.image
         if image.source == "FILE" and not image.packed_file and not os.path.isfile(bpy.path.abspath(image.filepath, library=image.library)):
             lost.add(name, f"image {image.name!r} is missing", "find it with File > External Data > Find Missing Files")
-        if image.source in ("SEQUENCE", "MOVIE"):
-            lost.add(name, f"image {image.name!r} is a movie", "its first frame is used for the whole shot")
-
-
-def _upstream(socket: bpy.types.NodeSocket) -> list[bpy.types.Node]:
-    """All nodes that a socket hangs on."""
-    found: list[bpy.types.Node] = []
-    stack = [link.from_node for link in socket.links]
-    while stack:
-        node = stack.pop()
-        if node not in found:
-            found.append(node)
-            stack += [link.from_node for s in node.inputs for link in s.links]
-    return found
-
-
-def _rebuild(tree, output, shader, name: str, lost: Lost) -> bpy.types.Node | None:
-    """A Principled BSDF in place of another plain shader; None if there is none like it."""
-    settings: dict[str, float] = {}
-    if shader.type == "BSDF_DIFFUSE":
-        settings = {"Roughness": 1.0, "Specular IOR Level": 0.0}
-    elif shader.type in ("BSDF_GLOSSY", "BSDF_ANISOTROPIC"):
-        settings = {"Metallic": 1.0}
-    elif shader.type in ("BSDF_GLASS", "BSDF_REFRACTION"):
-        settings = {"Transmission Weight": 1.0}
-    elif shader.type == "EMISSION":
-        return None
-    else:
-        label = shader.bl_label or shader.type
-        lost.add(name, f"{label} shader", "use a Principled BSDF, directly under the output")
-        shader = next((n for n in _upstream(output.inputs["Surface"]) if n.type == "BSDF_PRINCIPLED"), None)
-        if shader is not None:
-            tree.links.new(shader.outputs[0], output.inputs["Surface"])
-        return shader
-    new = tree.nodes.new("ShaderNodeBsdfPrincipled")
-    for key, value in settings.items():
-        new.inputs[key].default_value = value
-    for source, target in (("Color", "Base Color"), ("Roughness", "Roughness"), ("IOR", "IOR"), ("Normal", "Normal")):
-        old = shader.inputs.get(source)
-        if old is None or (source == "Roughness" and shader.type == "BSDF_DIFFUSE"):
-            continue
-        if old.is_linked:
-            tree.links.new(old.links[0].from_socket, new.inputs[target])
-        elif source != "Normal":
-            new.inputs[target].default_value = old.default_value
-    tree.links.new(new.outputs[0], output.inputs["Surface"])
-    return new
