@@ -411,7 +411,18 @@ fn an_image_that_no_memory_can_hold_is_refused_before_it_is_rendered() {
     let scene = Stage::drifting(2).write(&folder.path().join("s.gltf"));
     // Even where everything else is shared, a pixel takes a hundred bytes.
     let deep = out.join("shot 1").join("v2");
-    run(&scene, &deep, "-r 65536x60000 --progress none").refused(2, &["--memory", "MiB", "--resolution"]);
+    run(&scene, &deep, "-r 32768x32767 --progress none").refused(2, &["--memory", "MiB", "--resolution"]);
     // Not even the folders that were made for it remain.
     assert!(!out.exists());
+}
+
+#[test]
+fn more_samples_than_can_be_numbered_are_refused_but_in_parts() {
+    let (folder, out) = fresh();
+    let scene = Stage::drifting(2).write(&folder.path().join("s.gltf"));
+    for options in ["-r 65536x60000", "-r 16384x16384 --aa 3"] {
+        run(&scene, &out, options).refused(2, &["--resolution, --aa", "--crop"]);
+    }
+    run(&scene, &out, "-r 65536x60000 --crop 30000,30000,16,16 -f 0").ok();
+    assert_eq!(frames_in(&out).len(), 1);
 }
