@@ -11,6 +11,7 @@ from collections.abc import Callable
 import bpy
 import numpy as np
 
+from ..common.srgb import encoded
 from .materials import PLACED, make_plain, output_of
 from .nodes import PAIRS, placed, unreadable_inputs
 
@@ -161,8 +162,7 @@ def _within_one(bright: bpy.types.Image) -> tuple[bpy.types.Image, float]:
     pixels = pixels.reshape(-1, bright.channels)
     colours = np.clip(pixels[:, :3], 0.0, None)
     factor = float(colours.max()) or 1.0
-    colours = colours / factor
-    pixels[:, :3] = np.where(colours <= 0.0031308, 12.92 * colours, 1.055 * colours ** (1 / 2.4) - 0.055)
+    pixels[:, :3] = encoded(colours / factor)
     image = bpy.data.images.new(bright.name, *bright.size, alpha=False)
     image.pixels.foreach_set(pixels.reshape(-1))
     return image, factor

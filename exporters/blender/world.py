@@ -17,6 +17,7 @@ import numpy as np
 from ..common.extras import tidy
 from ..common.motion import Animation
 from ..common.report import Lost
+from ..common.srgb import decoded
 from .prepare import is_animated
 
 _READABLE = {".hdr", ".exr", ".png", ".jpg", ".jpeg"}
@@ -138,7 +139,7 @@ def _put_image(image: bpy.types.Image, folder: Path, stem: str) -> str | None:
     image.pixels.foreach_get(pixels)
     if not linear and not image.is_float:
         rgb = pixels.reshape(-1, 4)[:, :3]
-        rgb[:] = np.where(rgb <= 0.04045, rgb / 12.92, ((rgb + 0.055) / 1.055) ** 2.4)
+        rgb[:] = decoded(rgb)
     copy.pixels.foreach_set(pixels)
     copy.filepath_raw, copy.file_format = str(target), "OPEN_EXR"
     copy.save()

@@ -19,6 +19,7 @@ from pxr import Ar, Sdf
 
 from ..common.document import Document, write_whole
 from ..common.report import Lost
+from ..common.srgb import decoded, encoded
 
 _EXR_MAGIC = b"\x76\x2f\x31\x01"
 _DIRECT = {"PNG": ".png", "JPEG": ".jpg"}
@@ -93,7 +94,7 @@ class Textures:
         if pixels is None:
             return None
         c = "rgba".index(channel.output[0])
-        values = _decoded(pixels[..., c]) if c < 3 and self._coded(channel, colour) else pixels[..., c]
+        values = decoded(pixels[..., c]) if c < 3 and self._coded(channel, colour) else pixels[..., c]
         return values * channel.scale[c] + channel.bias[c]
 
     def top(self, channel: Channel, path: str) -> float:
@@ -125,7 +126,7 @@ class Textures:
                 if colour and number < 3:
                     if plane.max() > 1.001:
                         self.lost.add(path, f"colours over 1 in {Path(part.asset).name}", "they are cut off at 1; scale the image down")
-                    plane = _encoded(plane)
+                    plane = encoded(plane)
                 planes[number] = np.clip(plane, 0, 1)
             else:
                 planes[number] = part
@@ -220,16 +221,6 @@ def _exr_pixels(data: bytes) -> np.ndarray:
         raise KeyError("R")
     planes = [*(channels.get(c, first) for c in "RGB"), channels.get("A", np.ones_like(first))]
     return np.nan_to_num(np.stack(planes, axis=2))
-
-
-def _encoded(linear: np.ndarray) -> np.ndarray:
-    """Linear to sRGB."""
-    return np.where(linear <= 0.0031308, linear * 12.92, 1.055 * np.maximum(linear, 1e-9) ** (1 / 2.4) - 0.055)
-
-
-def _decoded(coded: np.ndarray) -> np.ndarray:
-    """sRGB to linear."""
-    return np.where(coded <= 0.04045, coded / 12.92, ((np.maximum(coded, 0) + 0.055) / 1.055) ** 2.4)
 
 
 def _resized(plane: np.ndarray, width: int, height: int) -> np.ndarray:

@@ -6,7 +6,7 @@
 use crate::{Error, Result};
 use std::cell::Cell;
 
-/// Counts what pictures take once they are decoded, which their size says nothing of: flat colour packs a thousand times.
+/// Counts what pictures take at least once they are decoded, which their size says nothing of: flat colour packs a thousand times.
 pub(super) struct Pictures {
     most: u64,
     taken: Cell<u64>,
@@ -18,15 +18,15 @@ impl Pictures {
         Self { most: most.unwrap_or(u64::MAX), taken: Cell::default() }
     }
 
-    /// Takes a picture of so many pixels, each of `size` bytes, and its smaller levels.
-    pub fn take(&self, pixels: usize, size: usize) -> Result<()> {
-        let bytes = pixels.saturating_mul(size) as u64;
+    /// Takes a picture of so many pixels, four bytes each, and its smaller levels.
+    pub fn take(&self, pixels: usize) -> Result<()> {
+        let bytes = 4 * pixels as u64;
         self.taken.set(self.taken.get().saturating_add(bytes).saturating_add(bytes / 3));
         if self.taken.get() <= self.most {
             return Ok(());
         }
         Err(Error::Usage(format!(
-            "--memory: the scene's pictures take at least {} MiB, over the {} MiB that there are or that it allows; make them smaller",
+            "the scene's pictures take at least {} MiB, over the {} MiB that there are or that --memory allows; make them smaller",
             self.taken.get().div_ceil(1 << 20),
             self.most >> 20
         )))

@@ -99,7 +99,7 @@ impl Images {
         for (source, data) in encoded {
             match check_size(&data, &mut pixels) {
                 Ok(count) => {
-                    pictures.take(count, size_of::<[u8; 4]>())?;
+                    pictures.take(count)?;
                     readable.push((source, data));
                 }
                 Err(why) => unreadable(notes, source, &why),
@@ -280,7 +280,7 @@ pub(super) fn load_file(
         Ok(count) => count,
         Err(why) => return Ok(Err(why)),
     };
-    pictures.take(count, size_of::<[u8; 4]>())?;
+    pictures.take(count)?;
     Ok(decode(data).map(|image| {
         let image = image.into_rgba8();
         let (width, height) = image.dimensions();
@@ -301,7 +301,7 @@ pub(super) fn load_world(document: &Document, uri: &str, place: &str, pictures: 
     let broken =
         |why: String| document.error(place, format!("the image cannot be read ({why}); save it again"));
     let count = check_size(&data, &mut pixels).map_err(broken)?;
-    pictures.take(count, size_of::<[u8; 4]>())?;
+    pictures.take(count)?;
     let image = decode(&data).map_err(broken)?;
     let (width, height) = (image.width(), image.height());
     let name = if uri.starts_with("data:") { "world" } else { uri };

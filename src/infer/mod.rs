@@ -68,7 +68,7 @@ pub use voxels::Voxels;
 use crate::frame::{PixelClass, RayCounts};
 use crate::scene::View;
 use creeping::forget_creeping;
-use entering::at_sides;
+use entering::{at_sides, uncut};
 use glam::DVec3;
 use moved::{moved, relight, ride};
 use rayon::prelude::*;
@@ -217,6 +217,9 @@ impl Inference {
 
         // Clear what a surface that opens to the eye stands before (not in the paper, whose objects are solid).
         rays.turned(old_view, &|triangle| turned(triangle, &to, landings, marks));
+
+        // Clear what a near or far plane that has moved no longer cuts off.
+        uncut(now, (old_view, new_view), landings, marks);
 
         // Clear what something that moved stands before.
         if let Some(motion) = motion {

@@ -182,8 +182,8 @@ pub fn replay(
     segments: &[(Segment, Reason)],
     cuts: &[i64],
 ) -> Result<Plan, String> {
-    let frames = |from: i64, to: i64| usize::try_from(to.saturating_sub(from)).unwrap_or(0);
-    let of_key = |(s, _): &(Segment, Reason)| (s.key, [frames(s.first, s.key), frames(s.key, s.last)]);
+    let count = |from: i64, to: i64| usize::try_from(to.saturating_sub(from)).unwrap_or(0);
+    let of_key = |(s, _): &(Segment, Reason)| (s.key, [count(s.first, s.key), count(s.key, s.last)]);
     let reaches: HashMap<i64, [usize; 2]> = segments.iter().map(of_key).collect();
     let reach = |place: usize| reaches.get(&path[place].frame).copied().unwrap_or_default();
     let survey = Survey::of(path, cuts, quality, reach);

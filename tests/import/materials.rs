@@ -46,13 +46,12 @@ fn materials_keep_their_factors_and_extensions() {
 fn specular_glossiness_becomes_a_dielectric_of_the_same_reflectance() {
     let mut gltf = Gltf::with_triangle();
     gltf.json["meshes"][0]["primitives"][0]["material"] = json!(0);
-    let extension =
-        json!({"diffuseFactor": [0.5, 0, 0, 1], "specularFactor": [0.04, 0.02, 1], "glossinessFactor": 0.75});
+    let extension = json!({"diffuseFactor": [0.5, 0, 0, 1], "specularFactor": [0.04, 0.02, 0.5], "glossinessFactor": 0.75});
     gltf.push("materials", json!({"extensions": {"KHR_materials_pbrSpecularGlossiness": extension}}));
     let scene = gltf.scene();
     let material = &scene.materials[0];
-    assert_eq!((material.metallic, material.roughness, material.base_color.x), (0.0, 0.25, 0.5));
-    assert!((material.specular_color - Vec3::new(1.0, 0.5, 25.0)).length() < 1e-5);
+    assert_eq!((material.metallic, material.roughness, material.base_color.x), (0.0, 0.25, 0.25));
+    assert!((material.specular_color - Vec3::new(1.0, 0.5, 12.5)).length() < 1e-5);
 }
 
 #[test]

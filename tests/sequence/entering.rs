@@ -188,6 +188,26 @@ fn a_sheet_whose_plane_the_eye_crosses_is_seen_however_large_it_is() {
 }
 
 #[test]
+fn what_moving_planes_of_the_view_uncover_is_seen() {
+    let steps = [3.0f32, 2.2, 1.6, 1.2, 0.9];
+    let near = (Target::CameraNear as fn(usize) -> Target, steps.to_vec());
+    let far = (Target::CameraFar as fn(usize) -> Target, steps.iter().map(|s| 20.0 / s).collect::<Vec<_>>());
+    for (target, values) in [near, far] {
+        let mut set = Set::new();
+        set.put(Mesh::plane(40.0, set.blue), DAffine3::from_translation(DVec3::new(0.0, -0.8, 0.0)));
+        set.ball(0.3, DVec3::new(0.3, 0.0, -1.8));
+        set.ball(1.0, DVec3::new(-2.0, 0.0, -12.0));
+        set.wall(40.0, -18.0);
+        let camera = set.camera(values.iter().map(|_| [0.0; 3]));
+        set.animate(target(camera), 1, values);
+        set.truth(1);
+        for quality in [Quality::HalfPixel, Quality::Centred, Quality::Verified] {
+            assert_eq!(set.wrong_objects(quality), [0; 5], "{:?}, {quality:?}", target(camera));
+        }
+    }
+}
+
+#[test]
 fn sub_pixels_show_what_has_just_come_in() {
     let mut set = Set::new();
     set.ball(0.5, DVec3::new(4.0, 0.0, -4.0));
