@@ -11,8 +11,19 @@ pub struct LightWay {
     pub word: usize,
     /// Its bits there.
     pub mask: u32,
-    /// True if the bits say nothing in this frame, because the source has moved or had not shone here.
-    pub stale: bool,
+    /// What that is still worth.
+    pub change: LightChange,
+}
+
+/// What has become of a light's shadow bits since another frame.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum LightChange {
+    /// They hold, whatever its colour and intensity are now.
+    None,
+    /// They hold where it shone: it has another range or cone, or was out.
+    Reach,
+    /// They say nothing: its light comes from elsewhere.
+    Place,
 }
 
 /// The shape of the lines on which light comes to a sample. Positions are as in [`super::SurfaceSample::position`].

@@ -13,7 +13,7 @@ pub use aov::{Aov, AovSet, Frame, FrameKind, Matte, Window};
 pub use class::PixelClass;
 pub use eye::{FrameId, StereoEye};
 pub use four::FourPoints;
-pub use light_way::{LightWay, Way};
+pub use light_way::{LightChange, LightWay, Way};
 pub use quality::Quality;
 pub use sample::{PackedNormal, SurfaceRef, SurfaceSample};
 pub use stats::{FrameStats, RayCounts, StageSeconds, SubPixelCounts};

@@ -76,10 +76,9 @@ impl<'a, R: CastCentres> Pass<'a, R> {
     pub fn new(
         (old, sources): (&'a BuzzBuffer, &'a Sources),
         (view, moves): (&'a Projector, bool),
-        rays: &'a R,
+        (rays, askers): (&'a R, Option<Askers<'a>>),
         trust: Trust,
     ) -> Self {
-        let askers = rays.motion().map(Askers::new);
         Self { old, sources, view, moves, grid: Grid::of(view), rays, trust, askers }
     }
 
@@ -249,7 +248,7 @@ impl<'a, R: CastCentres> Pass<'a, R> {
         let is_kept = row.class[x].is_reused() && self.sources.is_centred(y * self.old.width() + x);
         let settled = is_kept && ask.iter().all(|&bits| bits == 0);
         if let Some(askers) = &self.askers {
-            askers.ask(&row.sample(x), row.lit_mut(x), ask);
+            askers.ask(y * row.object.len() + x, &row.sample(x), row.lit_mut(x), ask);
         }
         if ask.iter().any(|&bits| bits != 0) {
             let (sample, lit) = (row.sample(x), row.lit_mut(x));

@@ -25,10 +25,12 @@ use super::around::{Around, Trust, believes_cells};
 use super::buzz_buffer::{BuzzBuffer, CastRays, Row, UNKNOWN};
 use super::cast::Pass;
 use super::frontier::Frontier;
+use super::moved::Askers;
 use super::outlines::Outlines;
 use super::project::Landings;
 use super::projector::Projector;
 use super::shadow_edges::ShadowEdges;
+use super::shafts::Shafts;
 use super::shares::{carry, spare};
 use super::sources::Sources;
 use crate::frame::{FourPoints, PixelClass, RayCounts, SurfaceRef, SurfaceSample};
@@ -203,13 +205,14 @@ impl Centring {
     /// whether the camera does.
     pub fn cast(
         &mut self,
-        old: &BuzzBuffer,
+        (old, shafts): (&BuzzBuffer, &mut Shafts),
         (view, moves): (&Projector, bool),
         rays: &impl CastCentres,
         trust: Trust,
         new: &mut BuzzBuffer,
     ) -> RayCounts {
-        let pass = Pass::new((old, &self.sources), (view, moves), rays, trust);
+        let askers = rays.motion().map(|motion| Askers::new(motion, new, shafts));
+        let pass = Pass::new((old, &self.sources), (view, moves), (rays, askers), trust);
         let mut counts = pass.cast(new, (&mut self.ask, &mut self.doubt));
         let frontier = &mut self.frontier;
         // Where everything is proven nothing new is met beside it.

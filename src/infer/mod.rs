@@ -24,6 +24,7 @@
 mod alike;
 mod around;
 mod between;
+mod bodies;
 mod buzz_buffer;
 mod carried;
 mod cast;
@@ -40,6 +41,7 @@ mod project;
 mod projector;
 mod seen;
 mod shadow_edges;
+mod shafts;
 mod shares;
 mod sources;
 mod stereo;
@@ -49,12 +51,13 @@ mod turned;
 mod voxels;
 
 pub use around::{Trust, is_one_surface};
+pub use bodies::{Bodies, Body};
 pub use buzz_buffer::{BuzzBuffer, CastRays, UNKNOWN};
 pub use centre::{CastCentres, Centring};
 pub use creeping::{Along, creeping};
 pub use entering::entering;
 pub use lattice::{Cells, Lattice, Position};
-pub use moved::{Body, Motion};
+pub use moved::Motion;
 pub use obscured::obscured;
 pub use project::{Landings, gather, project};
 pub use projector::{Projected, Projector};
@@ -63,7 +66,7 @@ pub use stereo::{Parallax, in_gaps, other_eye};
 pub use subpixel::{Level, Samples, SubPixels};
 pub use supersample::Supersampling;
 pub use turned::turned;
-pub use voxels::Voxels;
+pub use voxels::{Line, Voxels};
 
 use crate::frame::{PixelClass, RayCounts};
 use crate::scene::View;
@@ -72,6 +75,7 @@ use entering::{at_sides, uncut};
 use glam::DVec3;
 use moved::{moved, relight, ride};
 use rayon::prelude::*;
+use shafts::Shafts;
 use std::sync::atomic::{AtomicU8, AtomicU64, Ordering::Relaxed};
 use std::time::{Duration, Instant};
 
@@ -83,6 +87,7 @@ pub struct Inference {
     marks: Marks,
     centring: Centring,
     supersampling: Supersampling,
+    shafts: Shafts,
     /// The old samples where their surfaces are now; used only where something moves.
     now: BuzzBuffer,
 }
@@ -113,7 +118,7 @@ impl Inference {
     /// shadow bits, and where something in the scene moves or nothing does.
     pub fn bytes_per_pixel(levels: u32, words: usize, moves: bool) -> usize {
         let buffer = BuzzBuffer::bytes_per_pixel(words) + SubPixels::bytes_per_pixel(levels, words);
-        let now = if moves { buffer } else { 0 };
+        let now = if moves { buffer + Shafts::bytes_per_pixel(words) } else { 0 };
         let marks = size_of::<AtomicU64>() + size_of::<AtomicU8>();
         marks + Centring::bytes_per_pixel(words) + Supersampling::bytes_per_pixel(levels, words) + now
     }
@@ -154,7 +159,7 @@ impl Inference {
             cost.add(|| new.cast_unknown(&to, rays));
         }
         if let Some(motion) = rays.motion() {
-            cost.add(|| relight(new, motion));
+            cost.add(|| relight(new, motion, &mut self.shafts));
         }
         cost
     }
@@ -180,7 +185,7 @@ impl Inference {
         // has come in, cast as far as it goes. Then along shadows' edges.
         self.centring.recentre(old, (&self.landings, &self.marks), &to, rays, trust, new);
         let moves = old_view != new_view;
-        cost.add(|| self.centring.cast(old, (&to, moves), rays, trust, new));
+        cost.add(|| self.centring.cast((old, &mut self.shafts), (&to, moves), rays, trust, new));
         cost
     }
 

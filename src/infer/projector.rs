@@ -1,6 +1,6 @@
 //! The paper's "Generalizing Reprojection": where a stored hit lies in another view.
 
-use crate::frame::SurfaceSample;
+use crate::frame::{SurfaceSample, Way};
 use crate::scene::View;
 use glam::{DVec3, Mat4, Vec3};
 
@@ -117,6 +117,11 @@ impl Projector {
             (true, false) => (sample.position, self.eye - sample.position, 1.0),
             (false, _) => (sample.position, -self.forward, f32::INFINITY),
         }
+    }
+
+    /// The way on which what is not the background is seen.
+    pub(super) fn way_to_eye(&self) -> Way {
+        if self.perspective { Way::From(self.eye, 0.0) } else { Way::Along(-self.forward, 0.0) }
     }
 
     /// A number that is another in every view, as if by chance.

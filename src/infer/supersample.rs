@@ -19,10 +19,11 @@ use super::around::{SAME_FACING, Trust, is_one_surface};
 use super::buzz_buffer::{BuzzBuffer, UNKNOWN};
 use super::carried::Carried;
 use super::centre::CastCentres;
-use super::lattice::Position;
+use super::lattice::{Lattice, Position};
 use super::moved::Askers;
 use super::project::Landings;
 use super::projector::Projector;
+use super::shafts::Shafts;
 use super::subpixel::{Level, Samples, SubPixels};
 use super::{Cost, Inference, rides};
 use crate::frame::{RayCounts, SubPixelCounts, SurfaceSample};
@@ -61,7 +62,8 @@ impl Inference {
         rays: &impl CastCentres,
     ) -> (Cost, SubPixelCounts) {
         let view = Projector::new(view, origin);
-        fill(&mut self.supersampling.ask, buffer, &view, &Nothing, false, rays)
+        let room = (&mut self.supersampling.ask, &mut self.shafts);
+        fill(room, buffer, &view, &Nothing, false, rays)
     }
 
     /// Finds samples for the sub-pixels of `new`, whose pixels have just been inferred from `old` by this. `rays` casts them
@@ -80,7 +82,8 @@ impl Inference {
         let Supersampling { landings, ask } = &mut self.supersampling;
         let landed = land(old, &view, landings);
         let carried = Carried { old, landings, marks: &self.marks, view: &view, trust, rays };
-        let (cost, mut counts) = fill(ask, new, &view, &carried, trust == Some(Trust::Proof), rays);
+        let room = (ask, &mut self.shafts);
+        let (cost, mut counts) = fill(room, new, &view, &carried, trust == Some(Trust::Proof), rays);
         counts.wasted = landed - counts.wasted;
         (cost, counts)
     }
@@ -146,7 +149,7 @@ impl Source for Nothing {
 /// Chooses the sub-pixels of `new`, finds their samples in `source`, and casts the others; with `proves`, those that were
 /// found have to be proven visible by a ray. `wasted` counts what is not: those on which something landed.
 fn fill<R: CastCentres>(
-    ask: &mut Vec<u32>,
+    (ask, shafts): (&mut Vec<u32>, &mut Shafts),
     new: &mut BuzzBuffer,
     view: &Projector,
     source: &impl Source,
@@ -156,6 +159,7 @@ fn fill<R: CastCentres>(
     let (mut cost, mut counts) = (Cost::default(), SubPixelCounts::default());
     let mut finer = std::mem::take(&mut new.finer);
     let lattice = finer.lattice();
+    let askers = rays.motion().map(|motion| Askers::new(motion, new, shafts));
     for depth in 0..finer.levels.len() {
         let (coarser, level) = finer.levels.split_at_mut(depth);
         let Some(level) = level.first_mut() else { break };
@@ -173,7 +177,7 @@ fn fill<R: CastCentres>(
                 u64::from(source.is_landed(slot.at))
             })
             .sum::<u64>();
-        cost.add(|| slots(level, ask).map(|slot| cast(slot, source, proves, rays)).sum());
+        cost.add(|| slots(level, ask).map(|slot| cast(slot, source, proves, (rays, &askers), lattice)).sum());
         counts.sampled += level.samples.len() as u64;
         counts.reused += level.reused.iter().filter(|&&reused| reused).count() as u64;
         counts.wasted += landed;
@@ -201,7 +205,8 @@ fn cast(
     (mut slot, reused): (Slot<'_>, &mut bool),
     source: &impl Source,
     proves: bool,
-    rays: &impl CastCentres,
+    (rays, askers): (&impl CastCentres, &Option<Askers<'_>>),
+    lattice: Lattice,
 ) -> RayCounts {
     let mut counts = RayCounts::default();
     if rays.is_cancelled() {
@@ -215,8 +220,8 @@ fn cast(
         slot.lit.fill(0);
         source.lend(&mut slot);
     }
-    if let Some(motion) = rays.motion() {
-        Askers::new(motion).ask(slot.sample, slot.lit, slot.ask);
+    if let Some(askers) = askers {
+        askers.ask(lattice.pixel_around(slot.at), slot.sample, slot.lit, slot.ask);
     }
     if slot.ask.iter().any(|&bits| bits != 0) {
         rays.recast(slot.sample, slot.ask, slot.lit, &mut counts);

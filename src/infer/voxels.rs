@@ -1,10 +1,13 @@
 //! The space that a surface takes up, as a grid of marked voxels (the paper's "Moving objects").
 
-use glam::{UVec3, Vec3};
+use glam::{BVec3, IVec3, UVec3, Vec3};
 
 /// Voxels along the longest side of what moved. The seam around it, in which pixels and shadows are asked anew for nothing, is
-/// one voxel wide; marking and walking take time in proportion.
+/// one voxel wide; marking takes time in proportion.
 const LONGEST: f32 = 64.0;
+
+/// Voxels along each side of a brick, whose 64 bits are a word: most bricks are empty, and are passed in one step.
+const BRICK: u32 = 4;
 
 /// Cubes of equal size around a surface; those that it passes through are marked.
 #[derive(Debug, Clone, Default)]
@@ -13,8 +16,40 @@ pub struct Voxels {
     max: Vec3,
     /// Voxels to a metre.
     per_metre: f32,
+    /// In voxels.
     size: UVec3,
+    /// In bricks.
+    bricks: UVec3,
+    /// Those of each brick.
     bits: Vec<u64>,
+}
+
+/// A straight line from a point, which is asked about boxes.
+#[derive(Debug, Clone, Copy)]
+pub struct Line {
+    from: Vec3,
+    direction: Vec3,
+    /// One over the direction, or nearly so where that would be infinite.
+    per: Vec3,
+    until: f32,
+}
+
+impl Line {
+    /// The line from `from` along `direction`, up to `until` times as far (which may be infinite).
+    pub fn new(from: Vec3, direction: Vec3, until: f32) -> Self {
+        // No number is 0 times what a line parallel to a side has instead of infinity.
+        let zero = direction.cmpeq(Vec3::ZERO);
+        let per = Vec3::select(zero, Vec3::splat(f32::MIN_POSITIVE), direction).recip();
+        Self { from, direction, per, until }
+    }
+
+    /// The part of the line that lies within a box, as multiples of its direction; none where it passes by.
+    pub(super) fn within(&self, (min, max): (Vec3, Vec3)) -> Option<(f32, f32)> {
+        let (a, b) = ((min - self.from) * self.per, (max - self.from) * self.per);
+        let near = a.min(b).max_element().max(0.0);
+        let far = a.max(b).min_element().min(self.until);
+        (near <= far).then_some((near, far))
+    }
 }
 
 impl Voxels {
@@ -40,8 +75,9 @@ impl Voxels {
         let side = (longest / LONGEST).max(widest).max(f32::MIN_POSITIVE);
         let per_metre = side.recip();
         let size = ((max - min) * per_metre).ceil().as_uvec3().max(UVec3::ONE);
-        let bits = vec![0; (size.element_product() as usize).div_ceil(64)];
-        let mut this = Self { min, max, per_metre, size, bits };
+        let bricks = size.map(|side| side.div_ceil(BRICK));
+        let bits = vec![0; bricks.element_product() as usize];
+        let mut this = Self { min, max, per_metre, size, bricks, bits };
         for corners in triangles {
             let (from, to, slack) = around(corners);
             this.mark(corners, from, to, slack);
@@ -63,8 +99,8 @@ impl Voxels {
                     let voxel = UVec3::new(x, y, z);
                     let middle = self.min + (voxel.as_vec3() + 0.5) / self.per_metre;
                     if normal.dot(middle - a).abs() <= reach {
-                        let bit = self.bit(voxel);
-                        self.bits[bit / 64] |= 1 << (bit % 64);
+                        let brick = self.brick(voxel / BRICK);
+                        self.bits[brick] |= 1 << bit(voxel % BRICK);
                     }
                 }
             }
@@ -76,8 +112,9 @@ impl Voxels {
         at.max(Vec3::ZERO).as_uvec3().min(self.size - 1)
     }
 
-    fn bit(&self, voxel: UVec3) -> usize {
-        ((voxel.z * self.size.y + voxel.y) * self.size.x + voxel.x) as usize
+    /// The number of the brick at a place among bricks.
+    fn brick(&self, at: UVec3) -> usize {
+        ((at.z * self.bricks.y + at.y) * self.bricks.x + at.x) as usize
     }
 
     /// True where nothing is marked.
@@ -90,61 +127,96 @@ impl Voxels {
         (!self.is_empty()).then_some((self.min, self.max))
     }
 
-    /// True if the line from `from` along `direction`, up to `until` times as far (which may be infinite), passes through a
-    /// marked voxel.
-    pub fn are_crossed(&self, from: Vec3, direction: Vec3, until: f32) -> bool {
-        self.walk(from, direction, until, false)
+    /// True if a line passes through a marked voxel.
+    pub fn are_crossed(&self, line: &Line) -> bool {
+        self.walk(line, false)
     }
 
     /// The same of a line that begins on the surface itself: voxels that are marked all the way from there do not count.
-    pub fn are_crossed_again(&self, from: Vec3, direction: Vec3, until: f32) -> bool {
-        self.walk(from, direction, until, true)
+    pub fn are_crossed_again(&self, line: &Line) -> bool {
+        self.walk(line, true)
     }
 
-    /// Walks the voxels on a line until one is marked, once `inside` has been left.
-    fn walk(&self, from: Vec3, direction: Vec3, until: f32, mut inside: bool) -> bool {
-        let Some((begin, end)) = clip((self.min, self.max), from, direction, until) else { return false };
+    /// Walks the voxels on a line until one is marked, once `inside` has been left: brick by brick, and voxel by voxel where
+    /// any of a brick is marked.
+    fn walk(&self, line: &Line, mut inside: bool) -> bool {
         if self.is_empty() {
             return false;
         }
+        let Some((begin, end)) = line.within((self.min, self.max)) else { return false };
+        let length = end - begin;
         // In voxels, from where the line comes in.
-        let start = (from + direction * begin - self.min) * self.per_metre;
-        let along = direction * self.per_metre;
-        let mut voxel = self.voxel(start).as_ivec3();
-        let last = self.size.as_ivec3() - 1;
-        let step = along.signum().as_ivec3();
-        let across = along.abs().recip();
-        let ahead = voxel.as_vec3() + Vec3::select(along.cmpgt(Vec3::ZERO), Vec3::ONE, Vec3::ZERO) - start;
-        // A line that keeps to one slab of voxels never leaves it.
-        let leaves = Vec3::select(along.cmpeq(Vec3::ZERO), Vec3::INFINITY, ahead / along);
-        let mut next = leaves;
+        let start = (line.from + line.direction * begin - self.min) * self.per_metre;
+        let along = line.direction * self.per_metre;
+        let side = BRICK as f32;
+        let first = (self.voxel(start) / BRICK).as_ivec3();
+        let mut bricks = Steps::new(start / side, along / side, first);
+        let mut passed = 0.0;
         loop {
-            let bit = self.bit(voxel.as_uvec3());
-            let marked = self.bits[bit / 64] >> (bit % 64) & 1 != 0;
-            if marked && !inside {
-                return true;
+            let word = self.bits[self.brick(bricks.cell.as_uvec3())];
+            if word == 0 {
+                inside = false;
+            } else {
+                let corner = bricks.cell.as_vec3() * side;
+                let entry = (start + along * passed - corner).clamp(Vec3::ZERO, Vec3::splat(side));
+                let voxel = entry.as_ivec3().min(IVec3::splat(BRICK as i32 - 1));
+                let mut voxels = Steps::new(entry, along, voxel);
+                loop {
+                    let marked = word >> bit(voxels.cell.as_uvec3()) & 1 != 0;
+                    if marked && !inside {
+                        return true;
+                    }
+                    inside &= marked;
+                    if passed + voxels.advance() > length || !voxels.are_in(UVec3::splat(BRICK)) {
+                        break;
+                    }
+                }
             }
-            inside &= marked;
-            let axis = next.min_position();
-            if next[axis] > end - begin {
-                return false;
-            }
-            voxel[axis] += step[axis];
-            next[axis] += across[axis];
-            if voxel[axis] < 0 || voxel[axis] > last[axis] {
+            passed = bricks.advance();
+            if passed > length || !bricks.are_in(self.bricks) {
                 return false;
             }
         }
     }
 }
 
-/// The part of a line that lies within a box, as multiples of `direction`; none where it passes by.
-pub(super) fn clip((min, max): (Vec3, Vec3), from: Vec3, direction: Vec3, until: f32) -> Option<(f32, f32)> {
-    // No number is 0 times what a line parallel to a side has instead of infinity.
-    let zero = direction.cmpeq(Vec3::ZERO);
-    let per = Vec3::select(zero, Vec3::splat(f32::MIN_POSITIVE), direction).recip();
-    let (a, b) = ((min - from) * per, (max - from) * per);
-    let near = a.min(b).to_array().into_iter().fold(0.0, f32::max);
-    let far = a.max(b).to_array().into_iter().fold(until, f32::min);
-    (near <= far).then_some((near, far))
+/// The bit of a voxel at a place in its brick.
+fn bit(at: UVec3) -> u32 {
+    (at.z * BRICK + at.y) * BRICK + at.x
+}
+
+/// The cells of a grid that a line passes, one after the other (Amanatides and Woo 1987, "A Fast Voxel Traversal Algorithm").
+struct Steps {
+    cell: IVec3,
+    step: IVec3,
+    /// How far along the line the next cell begins on each axis, as a multiple of its direction.
+    next: Vec3,
+    /// How far a cell is across.
+    across: Vec3,
+}
+
+impl Steps {
+    /// Those of the line from `start`, which lies in `first`, along `along`, in cells.
+    fn new(start: Vec3, along: Vec3, first: IVec3) -> Self {
+        let still: BVec3 = along.cmpeq(Vec3::ZERO);
+        let ahead = first.as_vec3() + Vec3::select(along.cmpgt(Vec3::ZERO), Vec3::ONE, Vec3::ZERO) - start;
+        // A line that keeps to one slab of cells never leaves it.
+        let next = Vec3::select(still, Vec3::INFINITY, ahead / along);
+        Self { cell: first, step: along.signum().as_ivec3(), next, across: along.abs().recip() }
+    }
+
+    /// Goes on to the next cell, and says how far along the line that begins.
+    fn advance(&mut self) -> f32 {
+        let axis = self.next.min_position();
+        let at = self.next[axis];
+        self.cell[axis] += self.step[axis];
+        self.next[axis] += self.across[axis];
+        at
+    }
+
+    /// True in a grid of that size.
+    fn are_in(&self, size: UVec3) -> bool {
+        // What is below zero is beyond all sizes.
+        self.cell.as_uvec3().cmplt(size).all()
+    }
 }

@@ -2,7 +2,7 @@
 
 use crate::accel::{Accel, Displaced};
 use crate::frame::{LightWay, RayCounts, SurfaceSample};
-use crate::infer::{Body, Motion, Projector, Voxels};
+use crate::infer::{Bodies, Body, Motion, Projector, Voxels};
 use crate::scene::{Instance, Pose, Scene, Target, View};
 use crate::trace::{LightChanges, Tracer};
 use rayon::prelude::*;
@@ -15,7 +15,7 @@ pub(super) struct SceneMotion<'a> {
     tracer: &'a Tracer<'a>,
     /// The surfaces in the other frame.
     before: Displaced,
-    bodies: Vec<Body>,
+    bodies: Bodies,
     /// For each instance: the number of its body, if it has changed.
     body_of: Vec<Option<usize>>,
     lights: LightChanges,
@@ -54,14 +54,14 @@ impl<'a> SceneMotion<'a> {
             left: Voxels::new(instances.iter().flat_map(|&i| displaced.posed(scene, i).triangles()), slack),
         };
         let members: Vec<_> = members.values().collect();
-        let bodies = members.into_par_iter().map(body).collect();
+        let bodies = Bodies::new(members.into_par_iter().map(body).collect());
         let lights = tracer.light_changes(before, now);
         Some(Self { scene, accel, tracer, before: displaced, bodies, body_of, lights })
     }
 }
 
 impl Motion for SceneMotion<'_> {
-    fn bodies(&self) -> &[Body] {
+    fn bodies(&self) -> &Bodies {
         &self.bodies
     }
 
@@ -78,8 +78,12 @@ impl Motion for SceneMotion<'_> {
         })
     }
 
-    fn light_ways(&self, sample: &SurfaceSample, visit: &mut dyn FnMut(LightWay)) {
-        self.tracer.light_ways(sample, &self.lights, visit);
+    fn ways(&self) -> &[LightWay] {
+        self.lights.ways()
+    }
+
+    fn arrives_anew(&self, light: usize, sample: &SurfaceSample) -> bool {
+        self.tracer.arrives_anew(light, sample, &self.lights)
     }
 
     fn recast(&self, sample: &SurfaceSample, ask: &[u32], lit: &mut [u32], counts: &mut RayCounts) {

@@ -1,29 +1,27 @@
-//! How the lights differ from those of another frame, and on which ways light comes to a point.
+//! How the lights differ from those of another frame, and on which ways light comes.
 
 use super::Tracer;
 use super::light::Emitter;
 use super::sequence::MIDDLE;
-use crate::frame::{LightWay, SurfaceSample, Way};
+use crate::frame::{LightChange, LightWay, SurfaceSample, Way};
 use crate::scene::{LightKind, Pose, PosedLight};
 
 /// The lights of another frame, and what that says about shadow bits found then.
 pub struct LightChanges {
     /// In the order of the scene's lights.
-    lights: Vec<(Emitter, Change)>,
+    before: Vec<Emitter>,
+    /// The same, and the world's if it gives ambient light.
+    ways: Vec<LightWay>,
 }
 
-/// What has become of a light's shadow bits.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Change {
-    /// They hold, whatever its colour and intensity are now.
-    None,
-    /// They hold where it shone: it has another range or cone, or was out.
-    Reach,
-    /// They say nothing: its light comes from elsewhere.
-    Place,
+impl LightChanges {
+    /// On which ways light comes now: one for each light, and one for the world if it gives ambient light.
+    pub fn ways(&self) -> &[LightWay] {
+        &self.ways
+    }
 }
 
-impl Change {
+impl LightChange {
     /// From `before` to `now`; with soft shadows if `is_soft`.
     fn between(before: &PosedLight, now: &PosedLight, is_soft: bool) -> Self {
         let same_intensity = PosedLight { intensity: now.intensity, ..before.clone() };
@@ -44,46 +42,26 @@ impl Change {
 impl Tracer<'_> {
     /// How the lights have changed from `before` to `now`, which is the pose of this tracer.
     pub fn light_changes(&self, before: &Pose, now: &Pose) -> LightChanges {
-        let pairs = before.lights.iter().zip(&now.lights).zip(&self.layout.lights);
-        let lights = pairs.map(|((before, now), field)| {
-            (Emitter::new(before, self.accel.origin()), Change::between(before, now, field.is_share()))
+        let ways = self.lights.iter().zip(&self.layout.lights).zip(before.lights.iter().zip(&now.lights));
+        let ways = ways.map(|((light, &field), (before, now))| {
+            let (word, mask) = field.bits_at();
+            let change = LightChange::between(before, now, field.is_share());
+            LightWay { way: light.way(field.is_share()), word, mask, change }
         });
-        LightChanges { lights: lights.collect() }
-    }
-
-    /// Visits the ways on which light comes to a sample, which is not the background: those of lights whose bits are stale
-    /// since `changes`, and all others but from behind the surface.
-    pub fn light_ways(
-        &self,
-        sample: &SurfaceSample,
-        changes: &LightChanges,
-        visit: &mut dyn FnMut(LightWay),
-    ) {
-        let (point, normal) = (sample.position, sample.normal.get());
-        let lights = self.lights.iter().zip(&self.layout.lights).zip(&changes.lights);
-        for ((light, &field), (before, change)) in lights {
-            let stale = match change {
-                Change::None => false,
-                Change::Reach => {
-                    before.arriving(point, MIDDLE).is_none() && light.arriving(point, MIDDLE).is_some()
-                }
-                Change::Place => true,
-            };
-            let way = light.way(field.is_share());
-            let behind = match way {
-                Way::From(position, 0.0) => normal.dot(position - point) <= 0.0,
-                Way::Along(direction, 0.0) => normal.dot(direction) <= 0.0,
-                _ => false,
-            };
-            if stale || !behind {
-                let (word, mask) = field.bits_at();
-                visit(LightWay { way, word, mask, stale });
-            }
-        }
-        if let Some(field) = self.layout.ambient {
+        let ambient = self.layout.ambient.map(|field| {
             let (word, mask) = field.bits_at();
             let way = Way::Around(1.0 / self.options.ambient_samples as f32);
-            visit(LightWay { way, word, mask, stale: false });
+            LightWay { way, word, mask, change: LightChange::None }
+        });
+        LightChanges {
+            before: before.lights.iter().map(|light| Emitter::new(light, self.accel.origin())).collect(),
+            ways: ways.chain(ambient).collect(),
         }
+    }
+
+    /// True if light number `light` shines where a sample is, which is not the background, and before `changes` did not.
+    pub fn arrives_anew(&self, light: usize, sample: &SurfaceSample, changes: &LightChanges) -> bool {
+        let arrives = |light: &Emitter| light.arriving(sample.position, MIDDLE).is_some();
+        !arrives(&changes.before[light]) && arrives(&self.lights[light])
     }
 }

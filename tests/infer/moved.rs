@@ -2,8 +2,8 @@
 
 use crate::rig::view;
 use buzz::frame::PixelClass::{Good, Missed, Moved, Overlapped};
-use buzz::frame::{LightWay, PackedNormal, RayCounts, SurfaceRef, SurfaceSample, Way};
-use buzz::infer::{Body, BuzzBuffer, CastRays, Inference, Motion, Move, Projector, Voxels};
+use buzz::frame::{LightChange, LightWay, PackedNormal, RayCounts, SurfaceRef, SurfaceSample, Way};
+use buzz::infer::{Bodies, Body, BuzzBuffer, CastRays, Inference, Line, Motion, Move, Projector, Voxels};
 use glam::{DVec3, Vec3};
 use proptest::prelude::*;
 
@@ -44,8 +44,9 @@ proptest! {
         let (u, v) = if u + v > 1.0 { (1.0 - u, 1.0 - v) } else { (u, v) };
         let near = a + (b - a) * u + (c - a) * v + aside * (SLACK * 0.5);
         let from = near - direction * before;
-        prop_assert!(voxels(&triangles).are_crossed(from, direction * (before + beyond), 1.0));
-        prop_assert!(voxels(&triangles).are_crossed(from, direction, f32::INFINITY));
+        let voxels = voxels(&triangles);
+        prop_assert!(voxels.are_crossed(&Line::new(from, direction * (before + beyond), 1.0)));
+        prop_assert!(voxels.are_crossed(&Line::new(from, direction, f32::INFINITY)));
     }
 
     #[test]
@@ -58,7 +59,7 @@ proptest! {
         let reach = 1.8 * (2.0 / 64.0 + 2.0 * SLACK) + 2.0 * SLACK;
         let on_line = (0..=2000).map(|i| from.lerp(to, i as f32 / 2000.0));
         let comes_near = on_line.into_iter().any(|p| triangles.iter().any(|&t| is_near(p, t, reach)));
-        prop_assert!(comes_near || !voxels.are_crossed(from, to - from, 1.0));
+        prop_assert!(comes_near || !voxels.are_crossed(&Line::new(from, to - from, 1.0)));
     }
 }
 
@@ -66,15 +67,15 @@ proptest! {
 fn nothing_is_crossed_where_nothing_is_marked() {
     let nothing = Voxels::new(std::iter::empty::<[Vec3; 3]>(), |_| SLACK);
     assert!(nothing.is_empty());
-    assert!(!nothing.are_crossed(Vec3::ZERO, Vec3::X, f32::INFINITY));
+    assert!(!nothing.are_crossed(&Line::new(Vec3::ZERO, Vec3::X, f32::INFINITY)));
 }
 
 #[test]
 fn a_line_from_a_surface_crosses_it_again_only_where_it_comes_back() {
     let plates = [plate(0.0, 1.0), plate(0.0, 2.0)].concat();
     let voxels = voxels(&plates);
-    let from_first =
-        |direction| voxels.are_crossed_again(Vec3::new(0.0, 0.0, -1.0), direction, f32::INFINITY);
+    let from = Vec3::new(0.0, 0.0, -1.0);
+    let from_first = |direction| voxels.are_crossed_again(&Line::new(from, direction, f32::INFINITY));
     assert!(from_first(Vec3::NEG_Z));
     assert!(!from_first(Vec3::Z));
 }
@@ -102,10 +103,9 @@ fn sample(x: f32, depth: f32, instance: u32) -> SurfaceSample {
 /// One body that moves by `by`, and one light; rays find the wall.
 #[derive(Default)]
 struct Play {
-    bodies: Vec<Body>,
+    bodies: Bodies,
     by: Option<Vec3>,
-    light: Vec3,
-    light_moves: bool,
+    light: Option<LightWay>,
 }
 
 impl CastRays for Play {
@@ -121,7 +121,7 @@ impl CastRays for Play {
 }
 
 impl Motion for Play {
-    fn bodies(&self) -> &[Body] {
+    fn bodies(&self) -> &Bodies {
         &self.bodies
     }
 
@@ -133,8 +133,12 @@ impl Motion for Play {
         self.by.map(|by| SurfaceSample { position: sample.position + by, ..*sample })
     }
 
-    fn light_ways(&self, _: &SurfaceSample, visit: &mut dyn FnMut(LightWay)) {
-        visit(LightWay { way: Way::From(self.light, 0.0), word: 0, mask: 1, stale: self.light_moves });
+    fn ways(&self) -> &[LightWay] {
+        self.light.as_slice()
+    }
+
+    fn arrives_anew(&self, _: usize, _: &SurfaceSample) -> bool {
+        false
     }
 
     fn recast(&self, _: &SurfaceSample, ask: &[u32], lit: &mut [u32], counts: &mut RayCounts) {
@@ -166,8 +170,13 @@ fn wall() -> Vec<SurfaceSample> {
     (0..5).map(|i| sample(i as f32 - 2.0, 1.0, WALL)).collect()
 }
 
-fn body(entered: &[[Vec3; 3]], left: &[[Vec3; 3]]) -> Vec<Body> {
-    vec![Body { entered: voxels(entered), left: voxels(left) }]
+fn body(entered: &[[Vec3; 3]], left: &[[Vec3; 3]]) -> Bodies {
+    Bodies::new(vec![Body { entered: voxels(entered), left: voxels(left) }])
+}
+
+/// A light that stands there.
+fn light(at: Vec3) -> Option<LightWay> {
+    Some(LightWay { way: Way::From(at, 0.0), word: 0, mask: 1, change: LightChange::None })
 }
 
 /// Where no line to the light passes any plate.
@@ -176,7 +185,7 @@ const BEHIND: Vec3 = Vec3::new(0.0, 0.0, -9.0);
 #[test]
 fn what_comes_in_front_clears_the_pixel_behind_it() {
     // Pixel 3 looks through x = 0.5 at depth 0.5.
-    let play = Play { bodies: body(&plate(0.5, 0.5), &[]), light: BEHIND, ..Play::default() };
+    let play = Play { bodies: body(&plate(0.5, 0.5), &[]), light: light(BEHIND), ..Play::default() };
     let (new, rays) = infer(&wall(), true, &play);
     assert_eq!(new.class, [Good, Good, Good, Moved, Good]);
     assert_eq!((rays.primary, rays.shadow), (1, 0));
@@ -188,7 +197,7 @@ fn a_sample_rides_on_its_surface_and_uncovers_what_was_behind() {
     old[1] = sample(-0.5, 0.5, BODY);
     let bodies = body(&plate(0.5, 0.5), &plate(-0.5, 0.5));
     let (new, rays) =
-        infer(&old, true, &Play { bodies, by: Some(Vec3::X), light: BEHIND, ..Play::default() });
+        infer(&old, true, &Play { bodies, by: Some(Vec3::X), light: light(BEHIND), ..Play::default() });
     assert_eq!(new.class, [Good, Missed, Good, Overlapped, Good]);
     assert_eq!(new.object, [WALL, WALL, WALL, BODY, WALL]);
     assert_eq!(new.position[3], Vec3::new(0.5, 0.0, -0.5));
@@ -200,7 +209,7 @@ fn a_sample_rides_on_its_surface_and_uncovers_what_was_behind() {
 fn samples_of_what_vanished_are_gone() {
     let mut old = wall();
     old[1] = sample(-0.5, 0.5, BODY);
-    let play = Play { bodies: body(&[], &plate(-0.5, 0.5)), light: BEHIND, ..Play::default() };
+    let play = Play { bodies: body(&[], &plate(-0.5, 0.5)), light: light(BEHIND), ..Play::default() };
     let (new, _) = infer(&old, true, &play);
     assert_eq!((new.class[1], new.object[1]), (Missed, WALL));
 }
@@ -208,7 +217,7 @@ fn samples_of_what_vanished_are_gone() {
 #[test]
 fn a_light_is_asked_where_something_came_before_it_or_left() {
     // Only the line from pixel 1, at x = -1, to the light passes x = 1.5 at depth 0.5.
-    let light = Vec3::new(4.0, 0.0, 0.0);
+    let light = light(Vec3::new(4.0, 0.0, 0.0));
     let asked = |entered: &[[Vec3; 3]], left: &[[Vec3; 3]], lit| {
         let play = Play { bodies: body(entered, left), light, ..Play::default() };
         infer(&wall(), lit, &play).1.shadow
@@ -222,7 +231,8 @@ fn a_light_is_asked_where_something_came_before_it_or_left() {
 
 #[test]
 fn a_light_that_moves_is_asked_everywhere_and_no_camera_ray_is_cast() {
-    let (new, rays) = infer(&wall(), false, &Play { light_moves: true, ..Play::default() });
+    let light = light(BEHIND).map(|light| LightWay { change: LightChange::Place, ..light });
+    let (new, rays) = infer(&wall(), false, &Play { light, ..Play::default() });
     assert_eq!((rays.primary, rays.shadow), (0, 5));
     assert_eq!(new.class, [Good; 5]);
     assert_eq!(new.lit, [1; 5]);
