@@ -8,6 +8,8 @@
 //! At an outline what comes into view is a pixel or two wide, and beside it in its row is something else. So rows come in pairs:
 //! in the second, a pixel that is cast takes the light of the one above it, if that was cast and shows the same surface.
 //!
+//! So is light that has changed shared, on what something moved before or a light that moved shines on ([`Changed::share`]).
+//!
 //! A pixel is filled so only if nothing landed around it either: elsewhere an outline is near. What is too narrow for one row is
 //! met in another, whose steps begin elsewhere, and from there [followed](super::outlines).
 
@@ -100,20 +102,13 @@ pub(super) fn lend(
         }
         return;
     }
-    let Some(reach) = steps.reach(x) else { return };
-    let lends = |other: usize| other < row.object.len() && tangent.may_lend(&row.sample(other));
-    let known = (x.checked_sub(reach).is_some_and(lends), lends(x + reach));
-    let words = row.lit_words;
-    let own = x * words..(x + 1) * words;
-    let (before, rest) = row.lit.split_at_mut(own.start);
-    let (own, after) = rest.split_at_mut(words);
-    let left = || &before[(x - reach) * words..][..words];
-    let right = || &after[(reach - 1) * words..][..words];
+    let Some((reach, known)) = beside(row, x, steps, &tangent) else { return };
+    let (left, own, right) = bits_beside(row, x, reach);
     let (first, second) = match known {
-        (true, true) => (left(), right()),
+        (true, true) => (left, right),
         // A share on one side of it may change from there; a few rays will tell.
-        (true, false) if rays.has_shares() => (left(), left()),
-        (false, true) if rays.has_shares() => (right(), right()),
+        (true, false) if rays.has_shares() => (left, left),
+        (false, true) if rays.has_shares() => (right, right),
         _ => return,
     };
     ask.fill(0);
@@ -123,6 +118,73 @@ pub(super) fn lend(
     // Between two pixels that asked there may be what neither of them sees.
     if rays.has_shares() && (reach > 1 || known != (true, true)) {
         rays.confirm(ask);
+    }
+}
+
+/// How far it is to the pixels between which column `x` lies, and which of the two lie on the surface of that tangent plane.
+fn beside(row: &Row<'_>, x: usize, steps: Steps, tangent: &Tangent<'_>) -> Option<(usize, (bool, bool))> {
+    let reach = steps.reach(x)?;
+    let lends = |other: usize| other < row.object.len() && tangent.may_lend(&row.sample(other));
+    Some((reach, (x.checked_sub(reach).is_some_and(lends), lends(x + reach))))
+}
+
+/// The shadow bits so far to the left of column `x`, its own, and those as far to the right; none beyond the image.
+fn bits_beside<'r>(row: &'r mut Row<'_>, x: usize, reach: usize) -> (&'r [u32], &'r mut [u32], &'r [u32]) {
+    let words = row.lit_words;
+    let (before, rest) = row.lit.split_at_mut(x * words);
+    let (own, after) = rest.split_at_mut(words);
+    let left = x.checked_sub(reach).map_or(&[][..], |left| &before[left * words..][..words]);
+    let right = after.get((reach - 1) * words..reach * words).unwrap_or_default();
+    (left, own, right)
+}
+
+/// The lights whose bits in a pixel may not hold any more, though it is reused; and room to find out.
+#[derive(Default)]
+pub(super) struct Changed {
+    /// Their bits.
+    pub bits: Vec<u32>,
+    mean: Vec<u32>,
+    differ: Vec<u32>,
+}
+
+impl Changed {
+    /// For so many words of shadow bits.
+    pub fn new(words: usize) -> Self {
+        let bits = || vec![0; words];
+        Self { bits: bits(), mean: bits(), differ: bits() }
+    }
+
+    /// Takes over of these lights, into column `x` of `row`, what the two pixels between which it lies agree on, if both lie on
+    /// its surface: the others have to be asked. What is taken over is in `doubt`: where it is wrong, the edge of a shadow is near,
+    /// and is [followed](super::shadow_edges) from where it is known. Returns whether anything is taken over.
+    pub fn share(
+        &mut self,
+        row: &mut Row<'_>,
+        x: usize,
+        steps: Steps,
+        view: &Projector,
+        rays: &impl CastCentres,
+        doubt: &mut [u32],
+    ) -> bool {
+        let tangent = Tangent::new(row.sample(x), view);
+        let Some((reach, (true, true))) = beside(row, x, steps, &tangent) else { return false };
+        let (left, own, right) = bits_beside(row, x, reach);
+        self.mean.copy_from_slice(left);
+        if rays.has_shares() {
+            rays.blend([(left, 1.0), (right, 1.0)].into_iter(), &mut self.mean);
+        }
+        self.differ.fill(0);
+        rays.differ(left, right, &mut self.differ);
+        let known = self.mean.iter().zip(&self.differ);
+        let mut shared = 0;
+        for (((own, doubt), bits), (mean, differ)) in own.iter_mut().zip(doubt).zip(&mut self.bits).zip(known)
+        {
+            *own = *own & !*bits | mean & *bits;
+            *doubt |= *bits & !differ;
+            shared |= *bits & !differ;
+            *bits &= differ;
+        }
+        shared != 0
     }
 }
 

@@ -2,7 +2,7 @@
 
 use super::voxels::{Line, Voxels};
 use crate::frame::Way;
-use glam::Vec3;
+use glam::{Vec3, Vec3A};
 use obvhs::aabb::Aabb;
 use obvhs::bvh2::Bvh2;
 use obvhs::ploc::{PlocBuilder, PlocSearchDistance, SortPrecision};
@@ -60,7 +60,7 @@ impl Places {
     /// Whether any body stands in `shaft`. Of body number `own`, from whose surface its line begins, voxels that it is inside of
     /// from there on do not count.
     pub fn meet(&self, shaft: &Shaft, own: Option<usize>) -> bool {
-        self.find(0, &|bounds| shaft.meets(bounds, Vec3::ZERO), &|body| match shaft {
+        self.find(0, &|bounds| shaft.meets(bounds, Vec3A::ZERO), &|body| match shaft {
             Shaft::Line(line) if own == Some(body) => self.voxels[body].are_crossed_again(line),
             Shaft::Line(line) => self.voxels[body].are_crossed(line),
             _ => true,
@@ -69,6 +69,7 @@ impl Places {
 
     /// Whether any body may stand in a shaft like this one to any point that is within `half`, on each axis, of its own.
     pub fn may_meet(&self, shaft: &Shaft, half: Vec3) -> bool {
+        let half = Vec3A::from(half);
         self.find(0, &|bounds| shaft.meets(bounds, half), &|_| true)
     }
 
@@ -76,12 +77,12 @@ impl Places {
     fn find(
         &self,
         node: usize,
-        may_hold: &impl Fn((Vec3, Vec3)) -> bool,
+        may_hold: &impl Fn((Vec3A, Vec3A)) -> bool,
         is: &impl Fn(usize) -> bool,
     ) -> bool {
         let Some(node) = self.tree.nodes.get(node) else { return false };
         let bounds = node.aabb();
-        if !may_hold((bounds.min.into(), bounds.max.into())) {
+        if !may_hold((bounds.min, bounds.max)) {
             return false;
         }
         let first = node.first_index as usize;
@@ -135,9 +136,10 @@ impl Shaft {
 
     /// Whether it may reach into the box from `min` to `max`, or would if its point were elsewhere within `half` of where it
     /// is: a line from there comes no farther from this one.
-    fn meets(&self, (min, max): (Vec3, Vec3), half: Vec3) -> bool {
+    #[inline]
+    fn meets(&self, (min, max): (Vec3A, Vec3A), half: Vec3A) -> bool {
         // What has a width is asked about the ball around.
-        let ball = || ((min + max) / 2.0, (max - min).length() / 2.0 + half.length());
+        let ball = || (Vec3::from((min + max) / 2.0), (max - min).length() / 2.0 + half.length());
         match *self {
             Self::Line(ref line) => line.within((min - half, max + half)).is_some(),
             Self::Cone { point, axis, tangent, until } => {
@@ -196,7 +198,7 @@ mod tests {
             let meets = |(number, voxels): (usize, &Voxels)| match &shaft {
                 Shaft::Line(line) if number == own => voxels.are_crossed_again(line),
                 Shaft::Line(line) => voxels.are_crossed(line),
-                shaft => voxels.bounds().is_some_and(|bounds| shaft.meets(bounds, Vec3::ZERO)),
+                shaft => voxels.bounds().is_some_and(|(min, max)| shaft.meets((min.into(), max.into()), Vec3A::ZERO)),
             };
             let expected = each.iter().enumerate().any(meets);
             // The ball around a body may stand out of that around several.

@@ -2,7 +2,7 @@
 //! lights that may have changed.
 
 use super::around::{Around, Lent, Trust, is_one_surface};
-use super::between::{self, Steps};
+use super::between::{self, Changed, Steps};
 use super::buzz_buffer::{BuzzBuffer, Row, UNKNOWN};
 use super::centre::CastCentres;
 use super::moved::Askers;
@@ -86,6 +86,7 @@ impl<'a, R: CastCentres> Pass<'a, R> {
     pub fn cast(&self, new: &mut BuzzBuffer, bits: Bits<'_>) -> RayCounts {
         self.by_rows(new, bits, |y, (row, above), bits, counts| {
             let (steps, mut memory) = (Steps::of(y), R::Memory::default());
+            let mut changed = self.changed();
             steps.columns(row.object.len(), |x| {
                 if row.object[x] != UNKNOWN && self.wants_proof((x, y), row) {
                     self.forget_if_hidden(x, row, counts);
@@ -94,7 +95,7 @@ impl<'a, R: CastCentres> Pass<'a, R> {
                     let found = self.fill((x, y), row, steps, &mut memory);
                     self.see((x, y), (row, above), found, self.of_pixel(bits, x), counts);
                 }
-                self.ask((x, y), row, self.of_pixel(bits, x), counts);
+                self.ask((x, y), row, self.of_pixel(bits, x), &mut changed, counts);
             });
         })
     }
@@ -104,6 +105,7 @@ impl<'a, R: CastCentres> Pass<'a, R> {
     pub fn prove(&self, new: &mut BuzzBuffer, pixels: &[u32], bits: Bits<'_>) -> RayCounts {
         let width = self.old.width();
         self.by_rows(new, bits, |y, (row, above), bits, counts| {
+            let mut changed = self.changed();
             let first = pixels.partition_point(|&pixel| (pixel as usize) < y * width);
             let columns = pixels[first..].iter().map(|&pixel| pixel as usize - y * width);
             for x in columns.take_while(|&x| x < width) {
@@ -115,7 +117,7 @@ impl<'a, R: CastCentres> Pass<'a, R> {
                 }
                 if row.object[x] == UNKNOWN {
                     self.see((x, y), (row, above), None, self.of_pixel(bits, x), counts);
-                    self.ask((x, y), row, self.of_pixel(bits, x), counts);
+                    self.ask((x, y), row, self.of_pixel(bits, x), &mut changed, counts);
                 }
             }
         })
@@ -238,21 +240,41 @@ impl<'a, R: CastCentres> Pass<'a, R> {
         doubt.fill(if lent == Lent::Cell { 0 } else { u32::MAX });
     }
 
+    /// Room for the lights that may have changed, where any may.
+    fn changed(&self) -> Changed {
+        if self.askers.is_some() { Changed::new(self.old.lit_words()) } else { Changed::default() }
+    }
+
     /// Asks the lights that have to be asked.
-    fn ask(&self, (x, y): (usize, usize), row: &mut Row<'_>, (ask, doubt): Bits<'_>, counts: &mut RayCounts) {
+    fn ask(
+        &self,
+        (x, y): (usize, usize),
+        row: &mut Row<'_>,
+        (ask, doubt): (&mut [u32], &mut [u32]),
+        changed: &mut Changed,
+        counts: &mut RayCounts,
+    ) {
         let rays = self.rays;
         if self.moves && rays.has_shares() && self.grid.has((x, y), RENEWED) {
             rays.confirm(ask);
         }
         // Its lights were asked when it was cast in an earlier frame, or since.
         let is_kept = row.class[x].is_reused() && self.sources.is_centred(y * self.old.width() + x);
-        let settled = is_kept && ask.iter().all(|&bits| bits == 0);
+        let mut settled = is_kept && ask.iter().all(|&bits| bits == 0);
+        let believed = doubt.iter().all(|&bits| bits == 0);
         if let Some(askers) = &self.askers {
-            askers.ask(y * row.object.len() + x, &row.sample(x), row.lit_mut(x), ask);
+            changed.bits.copy_from_slice(ask);
+            askers.ask(y * row.object.len() + x, &row.sample(x), row.lit(x), &mut changed.bits);
+            changed.bits.iter_mut().zip(&*ask).for_each(|(bits, asked)| *bits &= !asked);
+            if changed.bits.iter().any(|&bits| bits != 0) {
+                if self.trust == Trust::Neighbours {
+                    settled &= !changed.share(row, x, Steps::of(y), self.view, rays, doubt);
+                }
+                ask.iter_mut().zip(&changed.bits).for_each(|(ask, bits)| *ask |= bits);
+            }
         }
         if ask.iter().any(|&bits| bits != 0) {
             let (sample, lit) = (row.sample(x), row.lit_mut(x));
-            let believed = doubt.iter().all(|&bits| bits == 0);
             // Where what is found is not what was carried, that is in doubt around here too.
             let mut note = |lit: &[u32]| doubt.iter_mut().zip(lit).for_each(|(doubt, lit)| *doubt ^= lit);
             if believed {

@@ -1,6 +1,6 @@
 //! The space that a surface takes up, as a grid of marked voxels (the paper's "Moving objects").
 
-use glam::{BVec3, IVec3, UVec3, Vec3};
+use glam::{IVec3, UVec3, Vec3, Vec3A};
 
 /// Voxels along the longest side of what moved. The seam around it, in which pixels and shadows are asked anew for nothing, is
 /// one voxel wide; marking takes time in proportion.
@@ -27,24 +27,26 @@ pub struct Voxels {
 /// A straight line from a point, which is asked about boxes.
 #[derive(Debug, Clone, Copy)]
 pub struct Line {
-    from: Vec3,
-    direction: Vec3,
+    from: Vec3A,
+    direction: Vec3A,
     /// One over the direction, or nearly so where that would be infinite.
-    per: Vec3,
+    per: Vec3A,
     until: f32,
 }
 
 impl Line {
     /// The line from `from` along `direction`, up to `until` times as far (which may be infinite).
     pub fn new(from: Vec3, direction: Vec3, until: f32) -> Self {
+        let (from, direction) = (Vec3A::from(from), Vec3A::from(direction));
         // No number is 0 times what a line parallel to a side has instead of infinity.
-        let zero = direction.cmpeq(Vec3::ZERO);
-        let per = Vec3::select(zero, Vec3::splat(f32::MIN_POSITIVE), direction).recip();
+        let zero = direction.cmpeq(Vec3A::ZERO);
+        let per = Vec3A::select(zero, Vec3A::splat(f32::MIN_POSITIVE), direction).recip();
         Self { from, direction, per, until }
     }
 
     /// The part of the line that lies within a box, as multiples of its direction; none where it passes by.
-    pub(super) fn within(&self, (min, max): (Vec3, Vec3)) -> Option<(f32, f32)> {
+    #[inline]
+    pub(super) fn within(&self, (min, max): (Vec3A, Vec3A)) -> Option<(f32, f32)> {
         let (a, b) = ((min - self.from) * self.per, (max - self.from) * self.per);
         let near = a.min(b).max_element().max(0.0);
         let far = a.max(b).min_element().min(self.until);
@@ -143,11 +145,11 @@ impl Voxels {
         if self.is_empty() {
             return false;
         }
-        let Some((begin, end)) = line.within((self.min, self.max)) else { return false };
+        let Some((begin, end)) = line.within((self.min.into(), self.max.into())) else { return false };
         let length = end - begin;
         // In voxels, from where the line comes in.
-        let start = (line.from + line.direction * begin - self.min) * self.per_metre;
-        let along = line.direction * self.per_metre;
+        let start = (Vec3::from(line.from + line.direction * begin) - self.min) * self.per_metre;
+        let along = Vec3::from(line.direction) * self.per_metre;
         let side = BRICK as f32;
         let first = (self.voxel(start) / BRICK).as_ivec3();
         let mut bricks = Steps::new(start / side, along / side, first);
@@ -198,7 +200,7 @@ struct Steps {
 impl Steps {
     /// Those of the line from `start`, which lies in `first`, along `along`, in cells.
     fn new(start: Vec3, along: Vec3, first: IVec3) -> Self {
-        let still: BVec3 = along.cmpeq(Vec3::ZERO);
+        let still = along.cmpeq(Vec3::ZERO);
         let ahead = first.as_vec3() + Vec3::select(along.cmpgt(Vec3::ZERO), Vec3::ONE, Vec3::ZERO) - start;
         // A line that keeps to one slab of cells never leaves it.
         let next = Vec3::select(still, Vec3::INFINITY, ahead / along);
