@@ -22,6 +22,10 @@ use crate::frame::SurfaceSample;
 /// One pixel of a row in so many is cast and asks for itself.
 const STEP: usize = 8;
 
+/// What a pixel's own share weighs against that of one beside it which has asked anew. What it knows is the mean of many frames,
+/// so that it has less noise; but where it has changed it has to follow in a few frames.
+const OWN_WEIGHT: f32 = 6.0;
+
 /// The columns of a step, counted back from its end: the one in the middle, those in the middle of its halves, and the rest.
 const BACK: [usize; STEP] = [0, 4, 6, 2, 7, 5, 3, 1];
 
@@ -169,12 +173,13 @@ impl Changed {
         let tangent = Tangent::new(row.sample(x), view);
         let Some((reach, (true, true))) = beside(row, x, steps, &tangent) else { return false };
         let (left, own, right) = bits_beside(row, x, reach);
-        self.mean.copy_from_slice(left);
+        self.mean.copy_from_slice(own);
         if rays.has_shares() {
-            rays.blend([(left, 1.0), (right, 1.0)].into_iter(), &mut self.mean);
+            let known = [(&*own, OWN_WEIGHT), (left, 1.0), (right, 1.0)];
+            rays.blend(known.into_iter(), &mut self.mean);
         }
         self.differ.fill(0);
-        rays.differ(left, right, &mut self.differ);
+        [left, right].into_iter().for_each(|other| rays.differ(own, other, &mut self.differ));
         let known = self.mean.iter().zip(&self.differ);
         let mut shared = 0;
         for (((own, doubt), bits), (mean, differ)) in own.iter_mut().zip(doubt).zip(&mut self.bits).zip(known)
