@@ -8,7 +8,7 @@
 //! At an outline what comes into view is a pixel or two wide, and beside it in its row is something else. So rows come in pairs:
 //! in the second, a pixel that is cast takes the light of the one above it, if that was cast and shows the same surface.
 //!
-//! So is light that has changed shared, on what something moved before or a light that moved shines on ([`Changed::share`]).
+//! So is light that has changed shared, on what something moved before or a light that moved shines on ([`Changed`]).
 //!
 //! A pixel is filled so only if nothing landed around it either: elsewhere an outline is near. What is too narrow for one row is
 //! met in another, whose steps begin elsewhere, and from there [followed](super::outlines).
@@ -147,49 +147,56 @@ fn bits_beside<'r>(row: &'r mut Row<'_>, x: usize, reach: usize) -> (&'r [u32], 
 pub(super) struct Changed {
     /// Their bits.
     pub bits: Vec<u32>,
+    /// The bits on which the pixel and the two between which it lies agree.
+    pub agreed: Vec<u32>,
     mean: Vec<u32>,
-    differ: Vec<u32>,
 }
 
 impl Changed {
     /// For so many words of shadow bits.
     pub fn new(words: usize) -> Self {
         let bits = || vec![0; words];
-        Self { bits: bits(), mean: bits(), differ: bits() }
+        Self { bits: bits(), agreed: bits(), mean: bits() }
     }
 
-    /// Takes over of these lights, into column `x` of `row`, what the two pixels between which it lies agree on, if both lie on
-    /// its surface: the others have to be asked. What is taken over is in `doubt`: where it is wrong, the edge of a shadow is near,
-    /// and is [followed](super::shadow_edges) from where it is known. Returns whether anything is taken over.
-    pub fn share(
+    /// Finds out on which lights column `x` of `row` agrees with the two pixels between which it lies, which have been asked: on
+    /// none if either shows another surface.
+    pub fn compare(
         &mut self,
         row: &mut Row<'_>,
         x: usize,
         steps: Steps,
         view: &Projector,
         rays: &impl CastCentres,
-        doubt: &mut [u32],
-    ) -> bool {
+    ) {
+        self.agreed.fill(0);
         let tangent = Tangent::new(row.sample(x), view);
-        let Some((reach, (true, true))) = beside(row, x, steps, &tangent) else { return false };
+        let Some((reach, (true, true))) = beside(row, x, steps, &tangent) else { return };
         let (left, own, right) = bits_beside(row, x, reach);
+        [left, right].into_iter().for_each(|other| rays.differ(own, other, &mut self.agreed));
+        self.agreed.iter_mut().for_each(|bits| *bits = !*bits);
         self.mean.copy_from_slice(own);
         if rays.has_shares() {
             let known = [(&*own, OWN_WEIGHT), (left, 1.0), (right, 1.0)];
             rays.blend(known.into_iter(), &mut self.mean);
         }
-        self.differ.fill(0);
-        [left, right].into_iter().for_each(|other| rays.differ(own, other, &mut self.differ));
-        let known = self.mean.iter().zip(&self.differ);
-        let mut shared = 0;
-        for (((own, doubt), bits), (mean, differ)) in own.iter_mut().zip(doubt).zip(&mut self.bits).zip(known)
+    }
+
+    /// Settles in `lit` those of these lights on which there is agreement, so that only the others are left to be asked. They are in
+    /// `doubt`: where all three are wrong, the edge of a shadow is near, and is [followed](super::shadow_edges) from where it is
+    /// known. Returns whether anything is settled.
+    pub fn settle(&mut self, lit: &mut [u32], doubt: &mut [u32]) -> bool {
+        let known = self.mean.iter().zip(&self.agreed);
+        let mut settled = 0;
+        for (((lit, doubt), bits), (mean, agreed)) in lit.iter_mut().zip(doubt).zip(&mut self.bits).zip(known)
         {
-            *own = *own & !*bits | mean & *bits;
-            *doubt |= *bits & !differ;
-            shared |= *bits & !differ;
-            *bits &= differ;
+            let agreed = *bits & agreed;
+            *lit = *lit & !agreed | mean & agreed;
+            *doubt |= agreed;
+            *bits &= !agreed;
+            settled |= agreed;
         }
-        shared != 0
+        settled != 0
     }
 }
 

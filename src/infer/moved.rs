@@ -115,11 +115,21 @@ impl<'a> Askers<'a> {
         Self { motion, shafts }
     }
 
-    /// Sets in `ask` the bits of the lights of which `lit` may not hold any more, at a sample in pixel number `pixel`.
-    pub fn ask(&self, pixel: usize, sample: &SurfaceSample, lit: &[u32], ask: &mut [u32]) {
-        if sample.surface.is_background() {
-            return;
-        }
+    /// True if nothing about the lights at a sample in pixel number `pixel` can have changed.
+    pub fn are_quiet(&self, pixel: usize, sample: &SurfaceSample) -> bool {
+        sample.surface.is_background()
+            || self.motion.body_of(sample).is_none() && self.shafts.are_all_clear(pixel, sample)
+    }
+
+    /// Sets in `ask` the bits of the lights of which `lit` may not hold any more, at a sample in pixel number `pixel`; of those on
+    /// which its neighbours have `agreed`, perhaps more, as that is not looked into.
+    pub fn ask(
+        &self,
+        pixel: usize,
+        sample: &SurfaceSample,
+        (lit, agreed): (&[u32], &[u32]),
+        ask: &mut [u32],
+    ) {
         let motion = self.motion;
         // On a body everything else has moved.
         if motion.body_of(sample).is_some() {
@@ -127,7 +137,7 @@ impl<'a> Askers<'a> {
         }
         let bodies = motion.bodies();
         for (number, light) in motion.ways().iter().enumerate() {
-            let &LightWay { way, word, mask, change } = light;
+            let &LightWay { way, word, mask, change, .. } = light;
             if ask[word] & mask == mask {
                 continue;
             }
@@ -138,8 +148,11 @@ impl<'a> Askers<'a> {
             };
             let bits = lit[word] & mask;
             let changes = || {
-                if comes_from_behind(way, sample) || self.shafts.are_clear(pixel, sample, light) {
+                if self.shafts.are_clear(pixel, sample, light) || comes_from_behind(way, sample) {
                     return false;
+                }
+                if agreed.get(word).is_some_and(|agreed| agreed & mask == mask) {
+                    return true;
                 }
                 let shaft = Shaft::new(way, sample.position);
                 let hidden = bits != 0 && bodies.entered.meet(&shaft, None);
@@ -165,15 +178,14 @@ fn comes_from_behind(way: Way, sample: &SurfaceSample) -> bool {
 /// Asks anew about the lights of reused samples of `new` that something moved before.
 pub(super) fn relight(new: &mut BuzzBuffer, motion: &dyn Motion, shafts: &mut Shafts) -> RayCounts {
     let askers = Askers::new(motion, new, shafts);
-    let words = new.lit_words();
-    let width = new.width();
+    let (width, words) = (new.width(), new.lit_words());
     let ask_row = |(y, mut row): (usize, Row<'_>)| {
         let (mut counts, mut ask) = (RayCounts::default(), vec![0; words]);
         for x in 0..row.object.len() {
-            if row.class[x].is_reused() && row.object[x] != UNKNOWN {
-                let sample = row.sample(x);
+            let (pixel, sample) = (y * width + x, row.sample(x));
+            if row.class[x].is_reused() && row.object[x] != UNKNOWN && !askers.are_quiet(pixel, &sample) {
                 ask.fill(0);
-                askers.ask(y * width + x, &sample, row.lit_mut(x), &mut ask);
+                askers.ask(pixel, &sample, (row.lit(x), &[]), &mut ask);
                 motion.recast(&sample, &ask, row.lit_mut(x), &mut counts);
             }
         }

@@ -220,8 +220,9 @@ fn cast(
         slot.lit.fill(0);
         source.lend(&mut slot);
     }
-    if let Some(askers) = askers {
-        askers.ask(lattice.pixel_around(slot.at), slot.sample, slot.lit, slot.ask);
+    let pixel = lattice.pixel_around(slot.at);
+    if let Some(askers) = askers.as_ref().filter(|askers| !askers.are_quiet(pixel, slot.sample)) {
+        askers.ask(pixel, slot.sample, (slot.lit, &[]), slot.ask);
     }
     if slot.ask.iter().any(|&bits| bits != 0) {
         rays.recast(slot.sample, slot.ask, slot.lit, &mut counts);

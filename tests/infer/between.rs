@@ -1,7 +1,8 @@
 //! Where nothing landed, some pixels are cast and ask for the light, and those between only where these do not agree.
 
-use crate::stage::{SIDE, Stage, WALL, infer};
+use crate::stage::{SIDE, Stage, WALL, infer, infer_light};
 use buzz::frame::PixelClass;
+use buzz::infer::Trust;
 
 /// Columns of which nothing was known, nor of what is around them, seen from 6 pixels to the right.
 const NEW: std::ops::Range<usize> = 5..SIDE as usize;
@@ -77,4 +78,36 @@ fn what_is_narrower_than_a_step_is_met_in_some_row_and_followed_through_the_othe
     for [cast, _] in cast_and_asked(&Stage { card_ends: f64::INFINITY, light_ends: f64::INFINITY, strip }) {
         assert!(cast.contains(&7), "{cast:?}");
     }
+}
+
+/// How many pixels ask for a light whose shadow begins at `now` after it began at `before`. All know then whether it reaches them.
+fn asked_of_moved_light(before: f64, now: f64, trust: Trust) -> usize {
+    let stage = |light_ends| Stage { card_ends: f64::INFINITY, light_ends, strip: f64::NAN };
+    let after = stage(now);
+    let (new, eye, rays) = infer_light(&stage(before), &after, trust);
+    let side = SIDE as usize;
+    for i in 0..side * side {
+        let (x, y) = (i % side, i / side);
+        assert_eq!(new.lit(i)[0] == 1, eye.is_lit(&eye.meet(x, y)), "pixel {x}, {y}");
+    }
+    assert_eq!(rays.primary, 0);
+    rays.shadow as usize
+}
+
+#[test]
+fn a_light_that_moved_is_asked_by_some_pixels_and_along_its_shadow() {
+    let all = (SIDE * SIDE) as usize;
+    for (before, now) in [(f64::INFINITY, f64::INFINITY), (f64::NEG_INFINITY, f64::NEG_INFINITY)] {
+        // The ends of steps and what lies beyond the last one.
+        assert!((2..all / 2).contains(&asked_of_moved_light(before, now, Trust::Neighbours)));
+    }
+    // Column x shows the card at x - 4.5.
+    for now in [-3.0, -1.0, 0.0, 2.0, 4.0] {
+        for before in [now - 1.0, now, now + 1.0] {
+            assert!(asked_of_moved_light(before, now, Trust::Neighbours) < all * 3 / 4, "{before} to {now}");
+            assert_eq!(asked_of_moved_light(before, now, Trust::Proof), all);
+        }
+    }
+    // Where all is changed, all is asked.
+    assert_eq!(asked_of_moved_light(f64::INFINITY, f64::NEG_INFINITY, Trust::Neighbours), all);
 }

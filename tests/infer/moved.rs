@@ -196,8 +196,7 @@ fn a_sample_rides_on_its_surface_and_uncovers_what_was_behind() {
     let mut old = wall();
     old[1] = sample(-0.5, 0.5, BODY);
     let bodies = body(&plate(0.5, 0.5), &plate(-0.5, 0.5));
-    let (new, rays) =
-        infer(&old, true, &Play { bodies, by: Some(Vec3::X), light: light(BEHIND), ..Play::default() });
+    let (new, rays) = infer(&old, true, &Play { bodies, by: Some(Vec3::X), light: light(BEHIND) });
     assert_eq!(new.class, [Good, Missed, Good, Overlapped, Good]);
     assert_eq!(new.object, [WALL, WALL, WALL, BODY, WALL]);
     assert_eq!(new.position[3], Vec3::new(0.5, 0.0, -0.5));

@@ -1,8 +1,8 @@
 //! A card before a wall, of which every answer is known.
 
 use crate::rig::view;
-use buzz::frame::{PackedNormal, RayCounts, SurfaceRef, SurfaceSample};
-use buzz::infer::{BuzzBuffer, CastCentres, CastRays, Inference, Move, Projector, Trust};
+use buzz::frame::{LightChange, LightWay, PackedNormal, RayCounts, SurfaceRef, SurfaceSample, Way};
+use buzz::infer::{Bodies, BuzzBuffer, CastCentres, CastRays, Inference, Motion, Move, Projector, Trust};
 use buzz::scene::View;
 use glam::{DVec3, Vec3};
 use std::sync::Mutex;
@@ -27,12 +27,15 @@ pub struct Eye<'a> {
     stage: &'a Stage,
     view: View,
     pub asked: Mutex<Vec<(usize, usize)>>,
+    /// The light, if it has moved.
+    moved: Option<LightWay>,
+    bodies: Bodies,
 }
 
 impl<'a> Eye<'a> {
     pub fn at(stage: &'a Stage, x: f64) -> Self {
         let view = view(DVec3::new(x, 0.0, 0.0), 0.0, SIDE, SIDE);
-        Self { stage, view, asked: Mutex::default() }
+        Self { stage, view, asked: Mutex::default(), moved: None, bodies: Bodies::default() }
     }
 
     pub fn view(&self) -> &View {
@@ -67,8 +70,38 @@ impl<'a> Eye<'a> {
 impl CastRays for Eye<'_> {
     fn cast(&self, x: usize, y: usize, lit: &mut [u32], counts: &mut RayCounts) -> SurfaceSample {
         let sample = self.hit(x, y, counts);
-        self.recast(&sample, &[1], lit, counts);
+        CastCentres::recast(self, &sample, &[1], lit, counts);
         sample
+    }
+
+    fn motion(&self) -> Option<&dyn Motion> {
+        self.moved.is_some().then_some(self)
+    }
+}
+
+impl Motion for Eye<'_> {
+    fn bodies(&self) -> &Bodies {
+        &self.bodies
+    }
+
+    fn body_of(&self, _: &SurfaceSample) -> Option<usize> {
+        None
+    }
+
+    fn follow(&self, sample: &SurfaceSample) -> Option<SurfaceSample> {
+        Some(*sample)
+    }
+
+    fn ways(&self) -> &[LightWay] {
+        self.moved.as_slice()
+    }
+
+    fn arrives_anew(&self, _: usize, _: &SurfaceSample) -> bool {
+        false
+    }
+
+    fn recast(&self, sample: &SurfaceSample, ask: &[u32], lit: &mut [u32], counts: &mut RayCounts) {
+        CastCentres::recast(self, sample, ask, lit, counts);
     }
 }
 
@@ -119,12 +152,22 @@ pub fn infer<'a>(stage: &'a Stage, x: f64) -> (BuzzBuffer, Eye<'a>) {
 
 /// Infers the view from `x` of the stage `after` from that of the stage `before` from the middle.
 pub fn infer_change<'a>(before: &Stage, after: &'a Stage, x: f64) -> (BuzzBuffer, Eye<'a>, RayCounts) {
-    let (from, to) = (Eye::at(before, 0.0), Eye::at(after, x));
+    infer_from(before, Eye::at(after, x), Trust::Neighbours)
+}
+
+/// The same from the middle, where the light has moved from where it was `before` to where it is `after`.
+pub fn infer_light<'a>(before: &Stage, after: &'a Stage, trust: Trust) -> (BuzzBuffer, Eye<'a>, RayCounts) {
+    let light = LightWay { way: Way::Along(Vec3::Z, 0.0), word: 0, mask: 1, change: LightChange::Place };
+    infer_from(before, Eye { moved: Some(light), ..Eye::at(after, 0.0) }, trust)
+}
+
+fn infer_from<'a>(before: &Stage, to: Eye<'a>, trust: Trust) -> (BuzzBuffer, Eye<'a>, RayCounts) {
+    let from = Eye::at(before, 0.0);
     let side = SIDE as usize;
     let (mut old, mut new) = (BuzzBuffer::new(side, side, 1), BuzzBuffer::new(side, side, 1));
     old.cast_unknown(&Projector::new(&from.view, DVec3::ZERO), &from);
     let (source, target) = ((&old, &from.view), (&mut new, &to.view));
     let mut inference = Inference::default();
-    let cost = inference.infer_centred(Move::Camera, source, target, DVec3::ZERO, Trust::Neighbours, &to);
+    let cost = inference.infer_centred(Move::Camera, source, target, DVec3::ZERO, trust, &to);
     (new, to, cost.rays)
 }
