@@ -5,7 +5,8 @@
     .venv/bin/python scenes/speed.py OUT [--resolution 1280x720] [--frames 20] [--segment 12] [scene ...]
 
 `buzz-convert trade` renders the segments that hold the frames by every quality in turn, twice, without writing; the
-faster round counts. `breakfast_eight` is breakfast_dolly with as many point lights more as make eight.
+faster round counts. `breakfast_eight` is breakfast_dolly with as many point lights more as make eight, `crowd_60` is
+`build/crowd.py` with as many figures as its name says.
 """
 
 import argparse
@@ -13,10 +14,14 @@ import json
 import math
 import os
 import shutil
+import sys
 from pathlib import Path
 from statistics import mean
 
 from trade import ROOT, SCENES, processor, run, table
+
+sys.path.insert(0, str(ROOT / "scenes" / "build"))
+import crowd  # after the path: the scene scripts import each other by plain names
 
 EIGHT = 8
 TITLES = ["scene", "quality", "frames", "work instead of tracing", "camera and shadow rays", "shading, reflection"]
@@ -90,6 +95,9 @@ def main() -> None:
             scene = args.out / "eight" / "breakfast_eight.gltf"
             if SCENES["breakfast_dolly"].exists():
                 add_lights(SCENES["breakfast_dolly"], scene)
+        if name.startswith("crowd_"):
+            scene = args.out / f"{name}.made" / "crowd.gltf"
+            crowd.build(int(name.removeprefix("crowd_"))).write(scene.parent)
         if not scene.exists():
             print(f"skipped: {scene} is not there")
             continue

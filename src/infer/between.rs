@@ -8,10 +8,11 @@
 //! At an outline what comes into view is a pixel or two wide, and beside it in its row is something else. So rows come in pairs:
 //! in the second, a pixel that is cast takes the light of the one above it, if that was cast and shows the same surface.
 //!
-//! So is light that has changed shared, on what something moved before or a light that moved shines on ([`Changed`]).
-//!
 //! A pixel is filled so only if nothing landed around it either: elsewhere an outline is near. What is too narrow for one row is
 //! met in another, whose steps begin elsewhere, and from there [followed](super::outlines).
+//!
+//! Light that has changed on what is reused is shared in the same steps ([`Changed`]): on what moves, where a light has moved, and
+//! where something moved before one.
 
 use super::around::Tangent;
 use super::buzz_buffer::{Row, UNKNOWN};

@@ -27,6 +27,10 @@ const NEAR_LOOKOUT: usize = 16;
 /// what a camera turns around, lands nowhere and leaves no pixel empty.
 const SIDE_LOOKOUT: usize = 4;
 
+/// One pixel in so many on what has moved. Where it turns or folds, what comes before its own surface lies within the voxels that
+/// the line to the eye begins in, and they say nothing.
+const BODY_LOOKOUT: usize = 4;
+
 /// The growth in a frame from which what is seen grows fast.
 const FAST: f32 = 1.03;
 
@@ -167,7 +171,8 @@ impl<'a, R: CastCentres> Pass<'a, R> {
         let is_at_side = || x == 0 || y == 0 || x + 1 == self.old.width() || y + 1 == self.old.height();
         let looks_out =
             || has(NEAR_LOOKOUT) && (has(LOOKOUT) || grows()) || is_at_side() && self.grid.has_side((x, y));
-        self.trust == Trust::Proof || self.moves && looks_out()
+        let is_body = || self.askers.as_ref().is_some_and(|askers| askers.is_on_body(&row.sample(x)));
+        self.trust == Trust::Proof || self.moves && looks_out() || has(BODY_LOOKOUT) && is_body()
     }
 
     /// True if nothing landed on a pixel, nor on any around it.

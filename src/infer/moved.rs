@@ -7,6 +7,9 @@
 //! lets that light's ray be cast anew if it passes through an entered voxel where the light had arrived, or through one
 //! that was left where it had not.
 //!
+//! Few lines have anything that moved near them: [`Bodies`] and [`Shafts`] tell which. And where neighbours agree on a light
+//! that may have changed it need not be asked at all: see [`Changed`](super::between::Changed).
+//!
 //! Departure: the paper stores t for each light, up to which its shadow ray is known to be free, to walk no further. We
 //! store a bit; so a shadow that something else casts too is asked for more often than need be.
 
@@ -113,6 +116,11 @@ impl<'a> Askers<'a> {
     pub fn new(motion: &'a dyn Motion, new: &BuzzBuffer, shafts: &'a mut Shafts) -> Self {
         shafts.look(new, motion.bodies(), motion.ways());
         Self { motion, shafts }
+    }
+
+    /// True if a sample lies on something that has moved.
+    pub fn is_on_body(&self, sample: &SurfaceSample) -> bool {
+        self.motion.body_of(sample).is_some()
     }
 
     /// True if nothing about the lights at a sample in pixel number `pixel` can have changed.
