@@ -1,6 +1,7 @@
 //! Bodies and lights that move: voxels against brute force, and rows of five pixels before a wall.
 
 use crate::rig::view;
+use crate::stage::{Stage, infer_body};
 use buzz::frame::PixelClass::{Good, Missed, Moved, Overlapped};
 use buzz::frame::{LightChange, LightWay, PackedNormal, RayCounts, SurfaceRef, SurfaceSample, Way};
 use buzz::infer::{Bodies, Body, BuzzBuffer, CastRays, Inference, Line, Motion, Move, Projector, Voxels};
@@ -235,4 +236,13 @@ fn a_light_that_moves_is_asked_everywhere_and_no_camera_ray_is_cast() {
     assert_eq!((rays.primary, rays.shadow), (0, 5));
     assert_eq!(new.class, [Good; 5]);
     assert_eq!(new.lit, [1; 5]);
+}
+
+#[test]
+fn one_pixel_in_sixteen_of_what_moves_is_proven() {
+    let stage = Stage { card_ends: f64::INFINITY, light_ends: f64::INFINITY, strip: f64::NAN };
+    let (new, _, rays) = infer_body(&stage);
+    // Ten by ten pixels have two or three of such a grid on either axis.
+    assert!((4..=9).contains(&rays.visibility), "{rays:?}");
+    assert!(new.class.iter().all(|class| class.is_reused()));
 }

@@ -2,7 +2,9 @@
 
 use crate::rig::view;
 use buzz::frame::{LightChange, LightWay, PackedNormal, RayCounts, SurfaceRef, SurfaceSample, Way};
-use buzz::infer::{Bodies, BuzzBuffer, CastCentres, CastRays, Inference, Motion, Move, Projector, Trust};
+use buzz::infer::{
+    Bodies, Body, BuzzBuffer, CastCentres, CastRays, Inference, Motion, Move, Projector, Trust,
+};
 use buzz::scene::View;
 use glam::{DVec3, Vec3};
 use std::sync::Mutex;
@@ -29,6 +31,7 @@ pub struct Eye<'a> {
     pub asked: Mutex<Vec<(usize, usize)>>,
     /// The light, if it has moved.
     moved: Option<LightWay>,
+    /// What has moved: nothing, or one body that carries all that is seen.
     bodies: Bodies,
 }
 
@@ -75,7 +78,7 @@ impl CastRays for Eye<'_> {
     }
 
     fn motion(&self) -> Option<&dyn Motion> {
-        self.moved.is_some().then_some(self)
+        (self.moved.is_some() || !self.bodies.is_empty()).then_some(self)
     }
 }
 
@@ -85,7 +88,7 @@ impl Motion for Eye<'_> {
     }
 
     fn body_of(&self, _: &SurfaceSample) -> Option<usize> {
-        None
+        (!self.bodies.is_empty()).then_some(0)
     }
 
     fn follow(&self, sample: &SurfaceSample) -> Option<SurfaceSample> {
@@ -159,6 +162,12 @@ pub fn infer_change<'a>(before: &Stage, after: &'a Stage, x: f64) -> (BuzzBuffer
 pub fn infer_light<'a>(before: &Stage, after: &'a Stage, trust: Trust) -> (BuzzBuffer, Eye<'a>, RayCounts) {
     let light = LightWay { way: Way::Along(Vec3::Z, 0.0), word: 0, mask: 1, change: LightChange::Place };
     infer_from(before, Eye { moved: Some(light), ..Eye::at(after, 0.0) }, trust)
+}
+
+/// The same, where all that is seen has moved, though it is where it was: a body without an inside.
+pub fn infer_body(stage: &Stage) -> (BuzzBuffer, Eye<'_>, RayCounts) {
+    let bodies = Bodies::new(vec![Body::default()]);
+    infer_from(stage, Eye { bodies, ..Eye::at(stage, 0.0) }, Trust::Neighbours)
 }
 
 fn infer_from<'a>(before: &Stage, to: Eye<'a>, trust: Trust) -> (BuzzBuffer, Eye<'a>, RayCounts) {
