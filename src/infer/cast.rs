@@ -267,19 +267,21 @@ impl<'a, R: CastCentres> Pass<'a, R> {
         let is_kept = row.class[x].is_reused() && self.sources.is_centred(y * self.old.width() + x);
         let mut settled = is_kept && ask.iter().all(|&bits| bits == 0);
         let believed = doubt.iter().all(|&bits| bits == 0);
-        let (pixel, sample) = (y * row.object.len() + x, row.sample(x));
-        if let Some(askers) = self.askers.as_ref().filter(|askers| !askers.are_quiet(pixel, &sample)) {
+        let pixel = y * row.object.len() + x;
+        if let Some(askers) = &self.askers
+            && !askers.are_quiet(pixel, &row.sample(x))
+        {
             changed.bits.copy_from_slice(ask);
             if self.trust == Trust::Neighbours {
                 changed.compare(row, x, Steps::of(y), self.view, rays);
             }
-            askers.ask(pixel, &sample, (row.lit(x), &changed.agreed), &mut changed.bits);
+            askers.ask(pixel, &row.sample(x), (row.lit(x), &changed.agreed), &mut changed.bits);
             changed.bits.iter_mut().zip(&*ask).for_each(|(bits, asked)| *bits &= !asked);
             settled &= !changed.settle(row.lit_mut(x), doubt);
             ask.iter_mut().zip(&changed.bits).for_each(|(ask, bits)| *ask |= bits);
         }
         if ask.iter().any(|&bits| bits != 0) {
-            let lit = row.lit_mut(x);
+            let (sample, lit) = (row.sample(x), row.lit_mut(x));
             // Where what is found is not what was carried, that is in doubt around here too.
             let mut note = |lit: &[u32]| doubt.iter_mut().zip(lit).for_each(|(doubt, lit)| *doubt ^= lit);
             if believed {

@@ -125,8 +125,7 @@ impl<'a> Askers<'a> {
 
     /// True if nothing about the lights at a sample in pixel number `pixel` can have changed.
     pub fn are_quiet(&self, pixel: usize, sample: &SurfaceSample) -> bool {
-        sample.surface.is_background()
-            || self.motion.body_of(sample).is_none() && self.shafts.are_all_clear(pixel, sample)
+        sample.surface.is_background() || !self.is_on_body(sample) && self.shafts.are_all_clear(pixel, sample)
     }
 
     /// Sets in `ask` the bits of the lights of which `lit` may not hold any more, at a sample in pixel number `pixel`; of those on
@@ -138,14 +137,14 @@ impl<'a> Askers<'a> {
         (lit, agreed): (&[u32], &[u32]),
         ask: &mut [u32],
     ) {
-        let motion = self.motion;
         // On a body everything else has moved.
-        if motion.body_of(sample).is_some() {
+        if self.is_on_body(sample) {
             return ask.fill(u32::MAX);
         }
+        let motion = self.motion;
         let bodies = motion.bodies();
         for (number, light) in motion.ways().iter().enumerate() {
-            let &LightWay { way, word, mask, change, .. } = light;
+            let &LightWay { way, word, mask, change } = light;
             if ask[word] & mask == mask {
                 continue;
             }
