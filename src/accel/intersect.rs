@@ -174,18 +174,22 @@ impl Accel {
                 return self.blocks_in(scene, only, &ray, t_max - start, pending);
             }
             let slabs = SlabRay::new(ray.origin, ray.direction, ray.t_min);
-            self.upper.any(&slabs, t_max - start, pending, |leaf, pending| {
-                self.placed[self.upper_leaves[leaf].clone()].iter().any(|placed| match placed {
-                    Placed::Tree(tree) => self.blocks_in(scene, tree, &ray, t_max - start, pending),
-                    Placed::Shape(shape) => shape.blocks(scene, &ray, t_max - start),
-                })
-            })
+            self.upper.any(
+                |node| slabs.meet(node, t_max - start).1,
+                pending,
+                |leaf, pending| {
+                    self.placed[self.upper_leaves[leaf].clone()].iter().any(|placed| match placed {
+                        Placed::Tree(tree) => self.blocks_in(scene, tree, &ray, t_max - start, pending),
+                        Placed::Shape(shape) => shape.blocks(scene, &ray, t_max - start),
+                    })
+                },
+            )
         })
     }
 
     /// Calls `traverse` with room for what a ray has pending in both levels.
     #[inline(always)]
-    fn with_pending<T>(&self, traverse: impl FnOnce(&mut [Pending]) -> T) -> T {
+    pub(super) fn with_pending<T>(&self, traverse: impl FnOnce(&mut [Pending]) -> T) -> T {
         // Deeper trees are rare, and theirs are degenerate scenes.
         const USUAL: usize = 128;
         if self.pending <= USUAL {
@@ -252,15 +256,20 @@ impl Accel {
         let (tree, instances) = self.lower(placed);
         let (local, on) = placed.local(ray, &tree.bounds);
         let (slabs, sheared) = local.prepare();
-        tree.wide.any(&slabs, t_max - on, pending, |leaf, _| {
-            let pack = &tree.leaves[leaf];
-            sheared.intersect(pack, local.t_min, t_max - on).any(|(lane, hit)| {
-                let flags = pack.flags(lane);
-                let mesh = || mesh_of(scene, instances[pack.part(lane) as usize]);
-                let asks = |mesh| opacity::casts_shadow_at(scene, mesh, pack.primitive(lane), hit.u, hit.v);
-                flags & (SHADOW_TEST | SHADOW_PASS) == 0 || flags & SHADOW_TEST != 0 && asks(mesh())
-            })
-        })
+        tree.wide.any(
+            |node| slabs.meet(node, t_max - on).1,
+            pending,
+            |leaf, _| {
+                let pack = &tree.leaves[leaf];
+                sheared.intersect(pack, local.t_min, t_max - on).any(|(lane, hit)| {
+                    let flags = pack.flags(lane);
+                    let mesh = || mesh_of(scene, instances[pack.part(lane) as usize]);
+                    let asks =
+                        |mesh| opacity::casts_shadow_at(scene, mesh, pack.primitive(lane), hit.u, hit.v);
+                    flags & (SHADOW_TEST | SHADOW_PASS) == 0 || flags & SHADOW_TEST != 0 && asks(mesh())
+                })
+            },
+        )
     }
 
     /// Looks for something nearer on one shape; `start` is how far along the whole ray `ray` starts.

@@ -11,6 +11,7 @@
 
 mod deform;
 mod displaced;
+mod frustum;
 mod fused;
 mod intersect;
 mod known;
@@ -26,6 +27,7 @@ use crate::frame::SurfaceRef;
 use crate::scene::{Mesh, Pose, Scene};
 use deform::{Deformed, Shape, affine, is_deformable};
 pub use displaced::{Displaced, Posed};
+pub use frustum::Frustum;
 use fused::Fused;
 use glam::{Affine3A, DAffine3, DVec3, Mat3A, Vec3, Vec3A, Vec4};
 pub use intersect::{PreparedRay, Ray, RayHit, Sides};

@@ -4,7 +4,7 @@
 //! frame, where an edge's function is computed from its two vertices alone; two triangles that share the edge
 //! get exactly opposite values, so no ray slips between them. Zero counts as inside for both.
 
-use glam::{BVec4A, Vec3, Vec4, Vec4Swizzles};
+use glam::{BVec4A, Vec3, Vec3A, Vec4, Vec4Swizzles};
 
 /// A triangle, and what a hit on it needs to know.
 #[derive(Debug, Clone, Copy)]
@@ -66,6 +66,16 @@ impl TrianglePack {
         }
         let [primitives, parts, flags] = numbers;
         Self { corners, primitives, parts, flags }
+    }
+
+    /// For each corner and axis: the coordinates of all.
+    pub fn corners(&self) -> &[[Vec4; 3]; 3] {
+        &self.corners
+    }
+
+    /// The corners of one.
+    pub fn triangle(&self, lane: usize) -> [Vec3A; 3] {
+        self.corners.map(|[x, y, z]| Vec3A::new(x[lane], y[lane], z[lane]))
     }
 
     pub fn primitive(&self, lane: usize) -> u32 {

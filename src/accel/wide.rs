@@ -23,9 +23,9 @@ const FAR_SIDE: f32 = 1.0 + 4.0 * f32::EPSILON;
 pub(super) type Pending = (u32, f32);
 
 /// Eight boxes, and what is in them.
-struct WideNode {
+pub(super) struct WideNode {
     /// For each axis the minimum and the maximum of eight boxes; an empty place has a minimum above its maximum.
-    bounds: [[[Vec4; 2]; 2]; 3],
+    pub bounds: [[[Vec4; 2]; 2]; 3],
     children: [u32; 8],
 }
 
@@ -62,7 +62,7 @@ impl SlabRay {
 
     /// Where the ray enters each of the eight boxes, and a bit for each that it meets before `t_max`.
     #[inline(always)]
-    fn meet(&self, node: &WideNode, t_max: f32) -> ([Vec4; 2], u32) {
+    pub fn meet(&self, node: &WideNode, t_max: f32) -> ([Vec4; 2], u32) {
         let t_max = Vec4::splat(t_max);
         let mut enters = [Vec4::ZERO; 2];
         let mut mask = 0;
@@ -178,14 +178,14 @@ impl WideTree {
         }
     }
 
-    /// True if `blocks` is true for any leaf whose box the ray meets before `t_max`. Otherwise as [`WideTree::nearest`].
+    /// True if `is` is true for any leaf whose box is one of those that `meet` has bits for, as all are that it is in. Otherwise
+    /// as [`WideTree::nearest`].
     #[inline]
     pub fn any(
         &self,
-        ray: &SlabRay,
-        t_max: f32,
+        meet: impl Fn(&WideNode) -> u32,
         pending: &mut [Pending],
-        mut blocks: impl FnMut(usize, &mut [Pending]) -> bool,
+        mut is: impl FnMut(usize, &mut [Pending]) -> bool,
     ) -> bool {
         if self.nodes.is_empty() {
             return false;
@@ -195,7 +195,7 @@ impl WideTree {
         while waiting > 0 {
             waiting -= 1;
             let node = &self.nodes[pending[waiting].0 as usize];
-            let (_, mut mask) = ray.meet(node, t_max);
+            let mut mask = meet(node);
             while mask != 0 {
                 let child = node.children[mask.trailing_zeros() as usize & 7];
                 mask &= mask - 1;
@@ -204,7 +204,7 @@ impl WideTree {
                     waiting += 1;
                     continue;
                 }
-                if blocks((child & !LEAF) as usize, &mut pending[waiting..]) {
+                if is((child & !LEAF) as usize, &mut pending[waiting..]) {
                     return true;
                 }
             }

@@ -9,6 +9,7 @@ use super::moved::Askers;
 use super::projector::Projector;
 use super::shares::{carry, spare};
 use super::sources::Sources;
+use super::tiles::Tiles;
 use crate::frame::{PixelClass, RayCounts, SurfaceSample};
 use rayon::prelude::*;
 
@@ -64,6 +65,7 @@ impl Grid {
 pub(super) struct Pass<'a, R> {
     pub old: &'a BuzzBuffer,
     pub sources: &'a Sources,
+    proven: &'a Tiles,
     pub view: &'a Projector,
     /// Whether the camera moves.
     moves: bool,
@@ -78,12 +80,12 @@ type Bits<'a> = (&'a mut [u32], &'a mut [u32]);
 
 impl<'a, R: CastCentres> Pass<'a, R> {
     pub fn new(
-        (old, sources): (&'a BuzzBuffer, &'a Sources),
+        (old, sources, proven): (&'a BuzzBuffer, &'a Sources, &'a Tiles),
         (view, moves): (&'a Projector, bool),
         (rays, askers): (&'a R, Option<Askers<'a>>),
         trust: Trust,
     ) -> Self {
-        Self { old, sources, view, moves, grid: Grid::of(view), rays, trust, askers }
+        Self { old, sources, proven, view, moves, grid: Grid::of(view), rays, trust, askers }
     }
 
     /// Casts what is wanted at all pixels.
@@ -172,7 +174,10 @@ impl<'a, R: CastCentres> Pass<'a, R> {
         let looks_out =
             || has(NEAR_LOOKOUT) && (has(LOOKOUT) || grows()) || is_at_side() && self.grid.has_side((x, y));
         let is_body = || self.askers.as_ref().is_some_and(|askers| askers.is_on_body(&row.sample(x)));
-        self.trust == Trust::Proof || self.moves && looks_out() || has(BODY_LOOKOUT) && is_body()
+        match self.trust {
+            Trust::Proof => !self.proven.has((x, y)),
+            Trust::Neighbours => self.moves && looks_out() || has(BODY_LOOKOUT) && is_body(),
+        }
     }
 
     /// True if nothing landed on a pixel, nor on any around it.

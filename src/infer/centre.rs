@@ -33,8 +33,10 @@ use super::shadow_edges::ShadowEdges;
 use super::shafts::Shafts;
 use super::shares::{carry, spare};
 use super::sources::Sources;
+use super::tiles::Tiles;
 use crate::frame::{FourPoints, PixelClass, RayCounts, SurfaceRef, SurfaceSample};
 use rayon::prelude::*;
+use std::ops::Range;
 
 /// What re-centring asks of the scene, beside whole rays: parts of one, and surfaces that are known already.
 pub trait CastCentres: CastRays {
@@ -120,6 +122,17 @@ pub trait CastCentres: CastRays {
 
     /// True if something hides the sample from the eye. Counted as `visibility`.
     fn is_hidden(&self, sample: &SurfaceSample, counts: &mut RayCounts) -> bool;
+
+    /// True if it is known, without a ray for each, that none of the samples `at` the centres of a rectangle of pixels, columns
+    /// and rows, is hidden from the eye.
+    fn sees_all(
+        &self,
+        pixels: (Range<usize>, Range<usize>),
+        at: impl Fn(usize, usize) -> SurfaceSample,
+    ) -> bool {
+        let _ = (pixels, at);
+        false
+    }
 }
 
 /// So many samples must be known in the 3x3 around a pixel before it is filled from them.
@@ -133,6 +146,7 @@ pub struct Centring {
     ask: Vec<u32>,
     /// For each pixel: bits of the lights of which it is in doubt whether what was carried here is right around it.
     doubt: Vec<u32>,
+    tiles: Tiles,
     frontier: Frontier,
     outlines: Outlines,
     shadow_edges: ShadowEdges,
@@ -140,10 +154,11 @@ pub struct Centring {
 
 impl Centring {
     /// The most that it holds for each pixel with so many words of shadow bits: its source, the lights to ask and
-    /// those in doubt, and what following outlines and shadows' edges takes.
+    /// those in doubt, which tiles are proven, and what following outlines and shadows' edges takes.
     pub fn bytes_per_pixel(words: usize) -> usize {
         Sources::bytes_per_pixel(words)
             + 2 * words * size_of::<u32>()
+            + Tiles::BYTES_PER_PIXEL
             + Frontier::BYTES_PER_PIXEL
             + Outlines::BYTES_PER_PIXEL
             + ShadowEdges::bytes_per_pixel(words)
@@ -212,7 +227,13 @@ impl Centring {
         new: &mut BuzzBuffer,
     ) -> RayCounts {
         let askers = rays.motion().map(|motion| Askers::new(motion, new, shafts));
-        let pass = Pass::new((old, &self.sources), (view, moves), (rays, askers), trust);
+        self.tiles.clear();
+        if trust == Trust::Proof {
+            let at = |x: usize, y: usize| new.sample(y * new.width() + x);
+            self.tiles.look(new, |pixels| rays.sees_all(pixels, at));
+        }
+        let known = (old, &self.sources, &self.tiles);
+        let pass = Pass::new(known, (view, moves), (rays, askers), trust);
         let mut counts = pass.cast(new, (&mut self.ask, &mut self.doubt));
         let frontier = &mut self.frontier;
         // Where everything is proven nothing new is met beside it.

@@ -47,6 +47,7 @@ mod sources;
 mod stereo;
 mod subpixel;
 mod supersample;
+mod tiles;
 mod turned;
 mod voxels;
 

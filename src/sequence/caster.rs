@@ -8,6 +8,7 @@ use crate::infer::{CastCentres, CastRays, Lattice, Motion};
 use crate::scene::View;
 use crate::trace::{Eye, Tracer};
 use glam::Vec3;
+use std::ops::Range;
 
 /// Casts the rays of one frame.
 #[derive(Clone, Copy)]
@@ -135,6 +136,14 @@ impl CastCentres for Caster<'_> {
     fn is_hidden(&self, sample: &SurfaceSample, counts: &mut RayCounts) -> bool {
         counts.visibility += 1;
         self.tracer.is_hidden(&self.eye, sample)
+    }
+
+    fn sees_all(
+        &self,
+        pixels: (Range<usize>, Range<usize>),
+        at: impl Fn(usize, usize) -> SurfaceSample,
+    ) -> bool {
+        self.tracer.sees_all(&self.eye, pixels, at)
     }
 }
 

@@ -12,6 +12,7 @@ mod delta_lights;
 mod eye;
 mod form_factor;
 mod ggx;
+mod hidden;
 mod interaction;
 mod known;
 mod lanes;
@@ -26,7 +27,7 @@ mod visibility;
 mod whitted;
 mod world;
 
-use crate::accel::{Accel, Ray, Sides};
+use crate::accel::{Accel, Sides};
 use crate::frame::{PackedNormal, RayCounts, SurfaceRef, SurfaceSample};
 use crate::scene::{Pose, Scene, View};
 pub use changes::LightChanges;
@@ -44,9 +45,6 @@ use visibility::{Field, Inquiry, Layout};
 use whitted::Incoming;
 pub use whitted::KnownLight;
 use world::Surroundings;
-
-/// Something this much nearer than a sample, as a share of its distance, hides it.
-const HIDING_SHARE: f32 = 1e-3;
 
 /// How deep and how finely to trace.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -293,27 +291,6 @@ impl<'a> Tracer<'a> {
         let surface = self.surface(&it, &mut room);
         let irradiance = unshadowed.irradiance * share;
         finite(surface.albedo * irradiance * FRAC_1_PI * self.coverage(surface, 0))
-    }
-
-    /// True if something stands between the eye and a sample, nearer by more than a thousandth of its distance; for
-    /// the background, if anything stands there at all. The ray is not counted.
-    ///
-    /// An orthographic background sample does not say where it is, and is never found hidden.
-    pub fn is_hidden(&self, eye: &Eye, sample: &SurfaceSample) -> bool {
-        let (origin, direction, until) = match (eye.perspective, sample.surface.is_background()) {
-            (true, true) => (eye.position, sample.position, f32::INFINITY),
-            (true, false) => (eye.position, sample.position - eye.position, 1.0 - HIDING_SHARE),
-            (false, true) => return false,
-            (false, false) => {
-                let depth = (sample.position - eye.position).dot(eye.forward);
-                (sample.position - eye.forward * depth, eye.forward * depth, 1.0 - HIDING_SHARE)
-            }
-        };
-        // Planar depth to a length of `direction`.
-        let planar = direction.dot(eye.forward);
-        let (t_min, t_max) = (eye.near / planar, (eye.far / planar).min(until));
-        let ray = Ray { origin, direction, t_min, t_max };
-        planar > 0.0 && self.accel.intersect(self.scene, &ray, Sides::Visible).is_some()
     }
 
     fn point_of(&self, sample: &SurfaceSample) -> SurfacePoint<'a> {
