@@ -19,6 +19,9 @@ pub(super) struct Shape {
     weights: Vec<f32>,
     /// `render_from_mesh` of each joint; the last is the node's own, for vertices that no joint holds.
     joints: Vec<Affine3A>,
+    /// Whether its triangles are wound the other way where it stands: a skinned mesh is placed by its joints alone, but the node's
+    /// own transform still decides its winding (glTF 2.0, 3.7.4).
+    pub(super) mirrored: bool,
 }
 
 /// True for instances whose vertices are not simply the mesh's.
@@ -31,7 +34,7 @@ impl Shape {
     pub fn of(scene: &Scene, pose: &Pose, instance: &Instance, origin: DVec3) -> Self {
         let weights = pose.weights[instance.node].clone();
         let Some(skin) = instance.skin.map(|s| &scene.skins[s]) else {
-            return Self { weights, joints: Vec::new() };
+            return Self { weights, ..Self::default() };
         };
         let render_from_mesh = |world_from_node: DAffine3, node_from_mesh: DAffine3| {
             let mut m = world_from_node * node_from_mesh;
@@ -43,7 +46,8 @@ impl Shape {
             render_from_mesh(pose.world_from_node[node], bind)
         });
         let own = render_from_mesh(pose.world_from_node[instance.node], instance.node_from_object);
-        Self { weights, joints: joints.chain([own]).collect() }
+        let mirrored = own.matrix3.determinant() < 0.0;
+        Self { weights, joints: joints.chain([own]).collect(), mirrored }
     }
 }
 

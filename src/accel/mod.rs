@@ -186,7 +186,8 @@ impl Accel {
                 let parts = group.instances.iter().map(|&i| {
                     let mesh = scene.instances[i as usize].mesh;
                     let posed = self.deformed[i as usize].as_ref();
-                    Part::of(mesh, posed.map_or(scene.meshes[mesh].positions.as_slice(), |d| &d.positions))
+                    let positions = posed.map_or(scene.meshes[mesh].positions.as_slice(), |d| &d.positions);
+                    Part { mirrored: posed.is_some_and(|d| d.shape.mirrored), ..Part::of(mesh, positions) }
                 });
                 self.trees[group.tree] = Tree::new(scene, parts);
                 changed = true;
@@ -366,10 +367,11 @@ fn group(scene: &Scene) -> (Vec<Group>, Vec<Vec<usize>>) {
 fn place_group(scene: &Scene, group: &Group, pose: &Pose, origin: DVec3) -> Placement {
     let visible = pose.visible.get(group.node).copied().unwrap_or(false);
     let skinned = group.instances.first().is_some_and(|&i| scene.instances[i as usize].skin.is_some());
-    if skinned {
-        return Placement { present: visible, ..Placement::default() };
-    }
     let mut m = pose.world_from_node[group.node] * group.node_from_object;
+    let winding = if m.matrix3.determinant() < 0.0 { -1.0 } else { 1.0 };
+    if skinned {
+        return Placement { present: visible, winding, ..Placement::default() };
+    }
     m.translation -= origin;
     let render_from_object = affine(m);
     let object_from_render = render_from_object.inverse();
@@ -377,7 +379,7 @@ fn place_group(scene: &Scene, group: &Group, pose: &Pose, origin: DVec3) -> Plac
     Placement {
         render_from_object,
         normals: object_from_render.matrix3.transpose(),
-        winding: if m.matrix3.determinant() < 0.0 { -1.0 } else { 1.0 },
+        winding,
         present: visible && regular,
         fused_reach: 0.0,
     }

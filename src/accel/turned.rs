@@ -19,6 +19,8 @@ impl Accel {
             let placement = self.placement(index);
             let mesh = &scene.meshes[instance.mesh];
             let culled = opacity::culls_back(scene, mesh);
+            // A front is a front in the object's own space, whatever its placement mirrors; skinned vertices have left that.
+            let front = if instance.skin.is_some() { placement.winding } else { 1.0 };
             let object_from_render = placement.render_from_object.inverse();
             let [old, new] = eyes.map(|(at, w)| {
                 let at = if w > 0.0 {
@@ -30,11 +32,10 @@ impl Accel {
             });
             let positions = self.positions(index, mesh);
             let look = |[a, b, c]: [Vec3A; 3]| {
-                // In the object's own space, where a front is a front whatever its placement mirrors.
                 let normal = (b - a).cross(c - a);
                 let before = |(at, w): (Vec3A, f32)| normal.dot(at - a * w);
                 let (was, is) = (before(old), before(new));
-                let side = if culled { 1.0 } else { is.signum() };
+                let side = if culled { front } else { is.signum() };
                 if is * side > 0.0 && was * side <= 0.5 * is * side {
                     visit([a, b, c].map(|p| placement.render_from_object.transform_point3a(p).into()));
                 }

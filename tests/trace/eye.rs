@@ -3,7 +3,7 @@
 use crate::rig::*;
 use buzz::accel::KnownTriangles;
 use buzz::frame::RayCounts;
-use buzz::scene::{LightKind, Material, Mesh, Projection, Scene};
+use buzz::scene::{LightKind, Material, Mesh, Projection, Scene, Skin};
 use glam::{DAffine3, DQuat, DVec3, Vec3};
 use std::f32::consts::PI;
 
@@ -176,6 +176,27 @@ fn the_eye_alone_decides_what_hides_a_sample() {
     add_plane(&mut scene, matt(Vec3::ONE), 1.0, at(0.0, 2.0, 0.0));
     let covered = Rig::new(scene);
     assert!(covered.tracer().is_hidden(&covered.tracer().eye(&covered.view()), &seen));
+}
+
+/// What decides the winding of a skinned mesh is its node, though its joints alone place it (glTF 2.0, 3.7.4).
+#[test]
+fn a_skin_that_mirrors_shows_its_front_where_a_mirrored_mesh_does() {
+    for (is_skinned, mirrored) in [(false, false), (false, true), (true, false), (true, true)] {
+        let mut scene = floor(matt(Vec3::ONE));
+        let mirror = DAffine3::from_scale(DVec3::new(if mirrored { -1.0 } else { 1.0 }, 1.0, 1.0));
+        let node = scene.instances[0].node;
+        scene.nodes[node].transform = buzz::scene::LocalTransform::Matrix(mirror);
+        if is_skinned {
+            scene.skins.push(Skin { joints: vec![node], inverse_bind: Vec::new() });
+            scene.instances[0].skin = Some(0);
+            let vertices = scene.meshes[0].positions.len();
+            scene.meshes[0].joints.push(vec![[0; 4]; vertices]);
+            scene.meshes[0].joint_weights.push(vec![[1.0, 0.0, 0.0, 0.0]; vertices]);
+        }
+        let seen = Rig::new(scene).center().sample;
+        assert!(!seen.surface.is_background(), "skinned {is_skinned}, mirrored {mirrored}");
+        assert!(seen.normal.get().dot(Vec3::Y) > 0.99);
+    }
 }
 
 #[test]
