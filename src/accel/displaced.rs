@@ -55,6 +55,24 @@ impl<'a> Posed<'a> {
             .chain(bounds.into_iter().flat_map(sides))
             .map(move |t| t.map(|p| render_from_object.transform_point3(p)))
     }
+
+    /// Whether it is a shape that is placed: its surface is not that of its triangles, but within them.
+    pub fn is_shape(self) -> bool {
+        self.mesh.shape.is_some() && self.placement.present
+    }
+
+    /// Says of balls, given by their middles relative to the origin and their radii, whether the surface of a shape may pass them.
+    pub fn may_pass(self) -> impl Fn(Vec3, f32) -> bool + use<'a> {
+        let object_from_render = self.placement.render_from_object.inverse();
+        let axes = object_from_render.matrix3;
+        let [x, y, z] = [axes.x_axis, axes.y_axis, axes.z_axis].map(Vec3A::length_squared);
+        // No vector grows by more.
+        let growth = (x + y + z).sqrt();
+        move |middle, radius| {
+            let middle = object_from_render.transform_point3(middle).as_dvec3();
+            self.mesh.shape.as_ref().is_some_and(|shape| shape.may_pass(middle, f64::from(radius * growth)))
+        }
+    }
 }
 
 /// Farther away than this a shape without end is taken to end, metres: voxels around it are as coarse as its box is large.

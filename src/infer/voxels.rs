@@ -87,6 +87,34 @@ impl Voxels {
         this
     }
 
+    /// Marks the voxels, of a grid that triangles around it have made, near which a surface `may_pass`: it is asked for balls of
+    /// some radius around points. `slack` is what the grid was made with.
+    pub fn mark_near(&mut self, may_pass: impl Fn(Vec3, f32) -> bool, slack: impl Fn(Vec3) -> f32) {
+        let side = self.per_metre.recip();
+        let middle = |first: UVec3, sides: u32| self.min + (first.as_vec3() + sides as f32 * 0.5) * side;
+        // Half of a cube's diagonal.
+        let radius = |sides: u32| sides as f32 * side * 0.75f32.sqrt();
+        let cubes = |size: UVec3| {
+            (0..size.z).flat_map(move |z| {
+                (0..size.y).flat_map(move |y| (0..size.x).map(move |x| UVec3::new(x, y, z)))
+            })
+        };
+        for brick in cubes(self.bricks) {
+            let first = brick * BRICK;
+            // The slack is no larger than a voxel.
+            if !may_pass(middle(first, BRICK), radius(BRICK) + side) {
+                continue;
+            }
+            let passed = cubes(UVec3::splat(BRICK)).filter(|&place| {
+                let middle = middle(first + place, 1);
+                may_pass(middle, radius(1) + slack(middle))
+            });
+            let bits = passed.fold(0, |bits, place| bits | 1 << bit(place));
+            let number = self.brick(brick);
+            self.bits[number] |= bits;
+        }
+    }
+
     /// Marks the voxels in the box `from` to `to` that the plane of the triangle passes within `slack`.
     fn mark(&mut self, corners: [Vec3; 3], from: Vec3, to: Vec3, slack: f32) {
         let [first, last] = [from, to].map(|p| self.voxel((p - self.min) * self.per_metre));

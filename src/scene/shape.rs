@@ -133,6 +133,11 @@ impl Shape {
         self.double_sided
     }
 
+    /// Whether its surface may come nearer than `reach` to a point; false only where it surely does not.
+    pub fn may_pass(&self, point: DVec3, reach: f64) -> bool {
+        self.faces.iter().any(|face| face.may_pass(point, reach))
+    }
+
     pub(crate) fn faces(&self) -> &[Face] {
         &self.faces
     }
@@ -204,7 +209,21 @@ impl Face {
 
     /// Whether a point of the quadric is on the part that counts.
     pub fn holds(&self, p: DVec3) -> bool {
-        p.cmpge(self.min).all() && p.cmple(self.max).all() && p.x.hypot(p.z) <= self.radius
+        self.holds_near(p, 0.0)
+    }
+
+    /// Whether that part's bounds come so near to a point.
+    fn holds_near(&self, p: DVec3, reach: f64) -> bool {
+        let within = (p + reach).cmpge(self.min).all() && (p - reach).cmple(self.max).all();
+        within && p.x.hypot(p.z) <= self.radius + reach
+    }
+
+    fn may_pass(&self, p: DVec3, reach: f64) -> bool {
+        let Quadric { squares, products, .. } = self.quadric;
+        // The most that the equation's left side can change on the way there.
+        let curvature = squares.abs().max_element() + products.abs().element_sum() / 2.0;
+        let change = self.quadric.gradient(p).length() * reach + curvature * reach * reach;
+        self.holds_near(p, reach) && self.quadric.value(p).abs() <= change
     }
 }
 
@@ -261,6 +280,24 @@ mod tests {
         on(&capsule, DVec3::new(2.0, (3.1 - 0.1) / 2.0, 0.0), DVec3::new(0.8, 0.6, 0.0));
         assert_eq!(capsule.bounds(), [DVec3::new(-4.0, -6.5, -4.0), DVec3::new(4.0, 3.5, 4.0)]);
         on(&Shape::plane(f64::INFINITY, 2.0, false), DVec3::new(1e9, 0.0, -1.0), DVec3::Y);
+    }
+
+    /// Balls around points of the surface are passed however small, and from some distance on those elsewhere are not.
+    #[test]
+    fn a_ball_is_passed_where_the_surface_is() {
+        let paraboloid =
+            Quadric { squares: DVec3::new(1.0, 0.0, 1.0), linear: DVec3::NEG_Y, ..Quadric::default() };
+        let bowl = Shape::quadric(paraboloid, DVec3::new(-1.0, 0.0, -1.0), DVec3::ONE);
+        assert!(bowl.may_pass(DVec3::new(0.6, 0.36, 0.0), 1e-9));
+        assert!(!bowl.may_pass(DVec3::new(0.0, 0.7, 0.0), 0.2));
+        assert!(bowl.may_pass(DVec3::new(0.0, 0.7, 0.0), 0.9));
+        assert!(!bowl.may_pass(DVec3::new(1.5, 2.25, 0.0), 0.4), "beyond its bounds");
+        let cone = Shape::cylinder(2.0, 0.0, 1.0);
+        assert!(cone.may_pass(DVec3::new(0.55, 0.0, 0.0), 0.05) && !cone.may_pass(DVec3::ZERO, 0.2));
+        assert!(
+            cone.may_pass(DVec3::new(0.2, -1.05, 0.2), 0.06)
+                && !cone.may_pass(DVec3::new(1.2, -1.0, 0.0), 0.1)
+        );
     }
 
     #[test]

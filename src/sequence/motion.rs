@@ -1,10 +1,11 @@
 //! What differs between two frames beside the camera: which surfaces and lights, and where they are.
 
-use crate::accel::{Accel, Displaced};
+use crate::accel::{Accel, Displaced, Posed};
 use crate::frame::{LightWay, RayCounts, SurfaceSample};
 use crate::infer::{Bodies, Body, Motion, Projector, Voxels};
 use crate::scene::{Instance, Pose, Scene, Target, View};
 use crate::trace::{LightChanges, Tracer};
+use glam::Vec3;
 use rayon::prelude::*;
 use std::collections::BTreeMap;
 
@@ -50,14 +51,21 @@ impl<'a> SceneMotion<'a> {
         let slack = |p| projector.pixel_width(p);
         let displaced = accel.displaced(scene, before);
         let body = |instances: &Vec<usize>| Body {
-            entered: Voxels::new(instances.iter().flat_map(|&i| accel.posed(scene, i).triangles()), slack),
-            left: Voxels::new(instances.iter().flat_map(|&i| displaced.posed(scene, i).triangles()), slack),
+            entered: voxels(instances.iter().map(|&i| accel.posed(scene, i)), slack),
+            left: voxels(instances.iter().map(|&i| displaced.posed(scene, i)), slack),
         };
         let members: Vec<_> = members.values().collect();
         let bodies = Bodies::new(members.into_par_iter().map(body).collect());
         let lights = tracer.light_changes(before, now);
         Some(Self { scene, accel, tracer, before: displaced, bodies, body_of, lights })
     }
+}
+
+/// The voxels of instances in one pose.
+fn voxels<'a>(posed: impl Iterator<Item = Posed<'a>> + Clone, slack: impl Fn(Vec3) -> f32 + Copy) -> Voxels {
+    let mut voxels = Voxels::new(posed.clone().flat_map(Posed::triangles), slack);
+    posed.filter(|posed| posed.is_shape()).for_each(|shape| voxels.mark_near(shape.may_pass(), slack));
+    voxels
 }
 
 impl Motion for SceneMotion<'_> {

@@ -132,6 +132,39 @@ fn shapes_are_inferred_as_they_are_traced() {
     assert!(half.0 > offset - 1.0 && half.1 > 0.7);
 }
 
+/// A bowl moves whose box holds the floor, the lamp and the eye: no line between these passes a side of that box.
+#[test]
+fn a_shape_that_moves_is_followed_within_its_box() {
+    let mut scene = Scene::default();
+    let both = Material { double_sided: true, ..Material::dielectric(Vec3::new(0.8, 0.4, 0.2), 0.5) };
+    let both = scene.add_material(both);
+    place(&mut scene, Shape::plane(24.0, 24.0, true), both, 0.0, 0.0, 0.0, DVec3::ONE);
+    let bowl = Quadric { squares: DVec3::new(1.0, 0.0, 1.0), linear: DVec3::Y * -4.0, ..Quadric::default() };
+    let bowl = Shape::quadric(bowl, DVec3::new(-5.0, 0.0, -5.0), DVec3::new(5.0, 6.0, 5.0));
+    let bowl = scene.add_mesh(Mesh::analytic(bowl, both));
+    let bowl = scene.add_instance(bowl, DAffine3::IDENTITY);
+    scene.add_light(LightKind::Point, 200.0, DAffine3::from_translation(DVec3::new(3.5, 3.0, 3.5)));
+    let eye = DVec3::new(4.2, 2.0, 4.2);
+    let camera = scene.add_camera(eye, DVec3::new(-1.0, 0.5, 0.0), 1.1);
+    move_along(&mut scene, camera, [eye.as_vec3().to_array(); 2].concat());
+    let mut channel = scene.channels[0].clone();
+    channel.target = Target::Translation(scene.instances[bowl].node);
+    channel.curve.values = vec![-1.5, -1.0, 0.0, -0.5, -1.0, 0.15];
+    scene.channels.push(channel);
+    let of = |quality| render(&scene, Settings { quality, ..Settings::new(160, 90) });
+    let truth = of(Quality::Full);
+    let exposure = Exposure::of(truth.iter().map(|f| f.color.as_slice()));
+    for quality in [Quality::Verified, Quality::Centred] {
+        let frames = of(quality);
+        assert!(frames.iter().filter(|f| f.kind != FrameKind::Traced).count() > 6);
+        for (frame, truth) in frames.iter().zip(&truth) {
+            // None where they are the same.
+            let found = psnr(&frame.color, &truth.color, exposure);
+            assert!(found.is_none_or(|db| db > 80.0), "{quality:?}, frame {}: {found:?} dB", frame.number);
+        }
+    }
+}
+
 /// A sphere of very many triangles covers the same pixels, but for some at its rim, and is lit alike.
 #[test]
 fn a_sphere_looks_like_one_of_many_triangles() {
