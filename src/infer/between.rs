@@ -25,7 +25,7 @@ const STEP: usize = 8;
 
 /// What a pixel's own share weighs against that of one beside it which has asked anew. What it knows is the mean of many frames,
 /// so that it has less noise; but where it has changed it has to follow in a few frames.
-const OWN_WEIGHT: f32 = 6.0;
+const OWN_WEIGHT: f32 = 1.0;
 
 /// The columns of a step, counted back from its end: the one in the middle, those in the middle of its halves, and the rest.
 const BACK: [usize; STEP] = [0, 4, 6, 2, 7, 5, 3, 1];

@@ -1,7 +1,7 @@
 //! Soft light from the outside: what options do, and that nothing depends on how the work is cut up.
 
 use crate::rig::{assert_same_bytes, buzz, channels, frames_in, fresh, json, run};
-use crate::stage::{CAMERA, Stage};
+use crate::stage::{CAMERA, CARD, Stage};
 use serde_json::{Value, json};
 use std::path::PathBuf;
 
@@ -109,6 +109,38 @@ fn soft_light_stays_true_to_the_end_of_a_chain() {
         assert!(*inferred > full - 0.5, "{inferred} {full}");
     }
     assert!(inferred[2] > inferred[0] - 1.0, "{inferred:?}");
+}
+
+/// Light that something has passed settles where it rests: what its neighbours have asked anew weighs more than what was carried.
+#[test]
+fn soft_light_follows_what_moves_until_it_rests() {
+    let (folder, _) = fresh();
+    let mut stage = softly_lit(Stage::new());
+    let place = |i: i32| [0.3 * (i.min(6) - 6) as f32, 0.0, 0.0];
+    stage.translate(CARD, &(0..10).map(place).collect::<Vec<_>>());
+    let scene = stage.write(&folder.path().join("s.gltf"));
+    let render = |name: &str, options: &str| {
+        run(&scene, &folder.path().join(name), &format!("-r 160x90 --segment 129 {options}")).ok();
+        let red = |frame| channels(&folder.path().join(name).join(format!("s.{frame:04}.exr")))["R"].clone();
+        [0, 9].map(red)
+    };
+    let sixteen = "--light-samples 16 --ambient-samples 16";
+    let truth = render("truth", "-q full --light-samples 256 --ambient-samples 256 -f 0,9");
+    let full = render("full", &format!("-q full {sixteen} -f 0,9"));
+    let inferred = render("inferred", sixteen);
+    // Means of 8x8 pixels have little noise.
+    let error = |of: &[f32], truth: &[f32]| {
+        let blocks = (0..11).flat_map(|y| (0..20).map(move |x| (8 * x, 8 * y)));
+        let squares = blocks.map(|(x, y): (usize, usize)| {
+            let pixels = (0..64).map(|i| (y + i / 8) * 160 + x + i % 8);
+            (pixels.map(|i| of[i] - truth[i]).sum::<f32>() / 64.0).powi(2)
+        });
+        (squares.sum::<f32>() / 220.0).sqrt()
+    };
+    for ((inferred, full), truth) in inferred.iter().zip(&full).zip(&truth) {
+        let (inferred, full) = (error(inferred, truth), error(full, truth));
+        assert!(inferred < 4.0 * full, "{inferred} {full}");
+    }
 }
 
 #[test]
