@@ -7,9 +7,10 @@ never save it, and the operators in ui.py work on a copy in a background Blender
 from __future__ import annotations
 
 import contextlib
+import errno
 import io
+import os
 import re
-import shutil
 import tempfile
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -21,14 +22,17 @@ import numpy as np
 
 from ..common import extras, motion
 from ..common.document import Document
-from ..common.report import ExportError, InputError, Lost, OutputError
+from ..common.report import ExportError, InputError, Lost
 from . import cameras, world
 from .bake import bake_procedural
 from .losses import name_scene_losses
 from .materials import prepare_materials
+from .output import GENERATOR, Output
 from .prepare import prepare
 from .sample import InstanceTrack, Sampler
 
+# What a disk, a quota or a limit says that has no room.
+_FULL = {errno.ENOSPC, errno.EDQUOT, errno.EFBIG}
 _YUP_BACK = np.linalg.inv(cameras.YUP)
 
 
@@ -55,23 +59,18 @@ class Result:
 
 def export(path: Path, options: Options) -> Result:
     """Export the open file's scene to `path` (.gltf or .glb)."""
-    path = Path(path).resolve()
-    if path.suffix not in (".gltf", ".glb"):
-        raise OutputError(f"{path}: the name must end in .gltf or .glb")
+    output = Output(Path(path).resolve())
     try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        work = Path(tempfile.mkdtemp(prefix=".export-", dir=path.parent))
+        return _Export(output, options).run()
     except OSError as error:
-        raise OutputError(f"{path.parent}: cannot be written ({error.strerror}); choose another output folder") from error
-    try:
-        return _Export(path, options, work).run()
+        raise output.error(error) from error
     finally:
-        shutil.rmtree(work, ignore_errors=True)
+        output.discard()
 
 
 class _Export:
-    def __init__(self, path: Path, options: Options, work: Path) -> None:
-        self.path, self.options, self.work = path, options, work
+    def __init__(self, output: Output, options: Options) -> None:
+        self.output, self.options = output, options
         self.lost = Lost()
         self.scene = _choose_scene(options.scene)
         self.view_layer = next((v for v in self.scene.view_layers if v.use), self.scene.view_layers[0])
@@ -108,14 +107,14 @@ class _Export:
             light.write(document, animation, self.lost)
         for camera in sampler.cameras:
             camera.write(document, animation, self.lost)
-        surround = world.export_world(self.scene, self.path.parent, self.path.stem, self.lost)
+        surround = world.export_world(self.scene, self.output.folder, self.output.stem, self.lost)
         if surround is not None:
             world.animate_world(animation, sky, surround)
         if not document.root.get("extensions", {}).get("KHR_lights_punctual") and _dark(surround):
             self.lost.add(self.scene.name, "no light", "no light is visible in the render and the world is black; show a light, or only emission is seen")
         animation.close()
         self._finish(document, fps, self._cuts(sampler), surround)
-        return Result(self.path, self.lost, document.root)
+        return Result(self.output.path, self.lost, document.root)
 
     def _geometry(self, sampler: Sampler) -> Document:
         """Have Blender's exporter write the meshes and materials; a document without nodes."""
@@ -127,23 +126,15 @@ class _Export:
             bake_procedural(temporary, self.options.bake, self.options.progress)
         slots = [slot.material for ob in temporary.collection.objects for slot in ob.material_slots]
         prepare_materials([m for m in dict.fromkeys(slots) if m is not None], self.lost)
-        separate = self.path.suffix == ".gltf"
-        target = self.work / f"{self.path.stem}{self.path.suffix}"
+        target = self.output.folder / f"{self.output.stem}{self.output.path.suffix}"
         if shapes:
-            _call_exporter(target, separate, f"{self.path.stem}_textures")
+            _call_exporter(target)
             document = Document.load(target)
         else:
             document = Document()
         bpy.context.window.scene = self.scene
         self._collect(document, sampler)
         return document
-
-    def _place_textures(self) -> None:
-        """Put the textures beside the file that is about to be written; those of an earlier export stay until then."""
-        textures = self.work / f"{self.path.stem}_textures"
-        if textures.is_dir() and any(textures.iterdir()):
-            shutil.rmtree(self.path.parent / textures.name, ignore_errors=True)
-            shutil.move(textures, self.path.parent / textures.name)
 
     def _collect(self, document: Document, sampler: Sampler) -> None:
         """Read back which mesh each shape became, and drop the nodes."""
@@ -218,7 +209,7 @@ class _Export:
         document.root["scene"] = 0
         document.root["scenes"][0]["extras"] = {
             "buzz": extras.scene_extras(
-                generator="Buzz exporter for Blender",
+                generator=GENERATOR,
                 application=f"Blender {bpy.app.version_string}",
                 file=bpy.data.filepath,
                 fps=fps,
@@ -234,8 +225,7 @@ class _Export:
         if not document.root["scenes"][0]["nodes"]:
             document.root["scenes"][0].pop("nodes")
         extras.check(document.root)
-        self._place_textures()
-        document.save(self.path)
+        self.output.publish(document)
 
 
 def _dark(surround: dict | None) -> bool:
@@ -251,11 +241,11 @@ def _choose_scene(name: str | None) -> bpy.types.Scene:
     return bpy.data.scenes[name]
 
 
-def _call_exporter(path: Path, separate: bool, textures: str) -> None:
+def _call_exporter(path: Path) -> None:
     """Blender's glTF exporter on the current scene, geometry and materials only."""
     wanted = {
-        "export_format": "GLTF_SEPARATE" if separate else "GLB",
-        "export_texture_dir": textures,
+        "export_format": "GLTF_SEPARATE" if path.suffix == ".gltf" else "GLB",
+        "export_texture_dir": f"{path.stem}_textures",
         "export_animations": False,
         "export_morph": True,
         "export_morph_normal": True,
@@ -276,8 +266,14 @@ def _call_exporter(path: Path, separate: bool, textures: str) -> None:
         with contextlib.redirect_stdout(log), contextlib.redirect_stderr(log):
             bpy.ops.export_scene.gltf(filepath=str(path), **{k: v for k, v in wanted.items() if k in known})
     except RuntimeError as error:
+        number = re.search(r"\[Errno (\d+)\]", str(error))
+        if number and int(number[1]) in _FULL:
+            raise OSError(int(number[1]), os.strerror(int(number[1]))) from None
         lines = [line.strip() for line in str(error).splitlines() if line.strip() and not line.startswith("Location")]
         last = next((line for line in reversed(lines) if "Error" in line), lines[-1])
         mesh = re.findall(r"Extracting primitive: (.*)", log.getvalue())
         where = f" at mesh {mesh[-1]!r}" if mesh else ""
         raise ExportError(f"Blender's glTF exporter failed{where}: {last}; hide that object from the render, or simplify it") from None
+    if "Error while saving image" in log.getvalue():
+        # Blender goes on without that texture.
+        raise OSError(errno.ENOSPC, f"no room for its textures in {tempfile.gettempdir()}")

@@ -6,7 +6,9 @@ Blender's equirectangular convention is the one docs/extras.md states (its +X is
 from __future__ import annotations
 
 import math
+import os
 import shutil
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 from urllib.parse import quote
@@ -142,7 +144,7 @@ def _put_image(image: bpy.types.Image, folder: Path, stem: str) -> str | None:
         rgb[:] = decoded(rgb)
     copy.pixels.foreach_set(pixels)
     copy.filepath_raw, copy.file_format = str(target), "OPEN_EXR"
-    copy.save()
+    _save(copy.save, target)
     bpy.data.images.remove(copy)
     return target.name
 
@@ -174,6 +176,18 @@ def _bake(scene: bpy.types.Scene, folder: Path, stem: str) -> str:
     # Nothing is lit here, so Cycles need not work out where the sky is bright.
     scene.world.cycles.sampling_method = "NONE"
     sky.frame_set(scene.frame_current)
-    bpy.ops.render.render(write_still=True, scene=sky.name)
+    _save(lambda: bpy.ops.render.render(write_still=True, scene=sky.name), target)
     bpy.data.scenes.remove(sky)
     return target.name
+
+
+def _save(save: Callable[[], Any], target: Path) -> None:
+    """Have Blender save an image. It may not say that the disk is full; but then nothing more can be written either."""
+    try:
+        save()
+    finally:
+        with target.open("r+b") as file:
+            size = file.seek(0, os.SEEK_END)
+            file.write(bytes(1 << 16))
+            file.flush()
+            file.truncate(size)
