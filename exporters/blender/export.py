@@ -33,10 +33,10 @@ def _arguments(inside_blender: bool, argv: list[str]) -> argparse.Namespace:
         parser.add_argument("blend", type=Path, help="the .blend file (it is not changed)")
     parser.add_argument("output", type=Path, help="where to write: .gltf or .glb")
     parser.add_argument("--frames", type=_pair("-"), help="FIRST-LAST (the scene's)")
-    parser.add_argument("--resolution", type=_pair("x"), help="WIDTHxHEIGHT (the scene's)")
+    parser.add_argument("--resolution", type=_size, help="WIDTHxHEIGHT (the scene's)")
     parser.add_argument("--camera", help="one camera for the whole shot (the markers', else the scene's)")
     parser.add_argument("--scene", help="name of the scene (the one last open)")
-    parser.add_argument("--bake", type=int, default=1024, help="pixels of baked procedural textures, 0: do not bake (1024)")
+    parser.add_argument("--bake", type=_pixels, default=1024, help="pixels of baked procedural textures, 0: do not bake (1024)")
     return parser.parse_args(argv)
 
 
@@ -54,6 +54,19 @@ def _pair(separator: str):
 
     parse.__name__ = "pair"
     return parse
+
+
+def _pixels(text: str) -> int:
+    if not text.isdecimal() or int(text) > 16384:
+        raise argparse.ArgumentTypeError(f"{text!r} is not a number of pixels from 0 to 16384")
+    return int(text)
+
+
+def _size(text: str) -> tuple[int, int]:
+    size = _pair("x")(text)
+    if min(size) < 1:
+        raise argparse.ArgumentTypeError(f"{text!r} has no pixels; width and height are at least 1")
+    return size
 
 
 def main() -> int:

@@ -112,14 +112,14 @@ class _Runner:
 
     @staticmethod
     def _options(scene, settings) -> list[str]:
-        options = ["--scene", scene.name, "--bake", str(settings.bake)]
+        # One argument each, so that a name or a number that begins with a minus is not taken for an option.
+        options = [f"--scene={scene.name}", f"--bake={settings.bake}"]
         if settings.use_range:
-            # One argument, so that a negative first frame is not taken for an option.
             options.append(f"--frames={settings.first}-{settings.last}")
         if settings.use_resolution:
-            options += ["--resolution", f"{settings.width}x{settings.height}"]
+            options.append(f"--resolution={settings.width}x{settings.height}")
         if settings.camera is not None:
-            options += ["--camera", settings.camera.name]
+            options.append(f"--camera={settings.camera.name}")
         return options
 
     def modal(self, context, event):

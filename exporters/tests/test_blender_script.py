@@ -72,6 +72,10 @@ runpy.run_path({str(SCRIPT)!r}, run_name="__main__")
         ("good", ["good", "o.gltf", "--scene", "Nothing"], 3, "the file has Scene"),
         ("good", ["good", "o.gltf", "--frames", "5-1"], 3, "before the first"),
         ("good", ["good", "o.gltf", "--frames", "five"], 2, "two whole numbers"),
+        ("good", ["good", "o.gltf", "--resolution", "0x0"], 2, "at least 1"),
+        ("good", ["good", "o.gltf", "--resolution", "64x0"], 2, "at least 1"),
+        ("good", ["good", "o.gltf", "--resolution", "10x-5"], 2, "at least 1"),
+        ("good", ["good", "o.gltf", "--bake=-5"], 2, "from 0 to 16384"),
         ("good", ["good", "bad.blend/o.gltf"], 4, "cannot be written"),
     ],
 )

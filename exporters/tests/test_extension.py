@@ -84,9 +84,11 @@ def test_panel_settings_reach_the_file(blender, shot, tmp_path):
     settings.use_range, settings.first, settings.last = True, -2, 1
     settings.use_resolution, settings.width, settings.height = True, 20, 10
     settings.camera = blender.data.objects["Camera"]
+    settings.camera.name = blender.context.scene.name = "-Minus"
     assert blender.ops.render.buzz_export() == {"FINISHED"}
     buzz = Gltf(tmp_path / "out" / "shot.gltf").buzz
     assert (buzz["frame_start"], buzz["frame_end"], buzz["resolution"]) == (-2, 1, [20, 10])
+    assert buzz["cuts"][0]["camera"] == "-Minus"
 
 
 def test_export_and_convert_loads_the_sequence(blender, shot, buzz, tmp_path, monkeypatch):
