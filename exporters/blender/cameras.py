@@ -35,12 +35,19 @@ class CameraTrack:
     poses: list[np.ndarray] = field(default_factory=list)
     lens: list[dict[str, float]] = field(default_factory=list)
     node: int = -1
+    broken: bool = False
 
     def sample(self, depsgraph: bpy.types.Depsgraph, size: tuple[int, int], aspect: tuple[float, float]) -> None:
         """Record pose and lens at the scene's current frame."""
         ob = self.source.evaluated_get(depsgraph)
         data = ob.data
         p = ob.calc_matrix_camera(depsgraph, x=size[0], y=size[1], scale_x=aspect[0], scale_y=aspect[1])
+        # Blender gives zeros where near and far, or an orthographic scale, leave no volume.
+        if not (np.isfinite(p).all() and p[0][0] and p[1][1] and (np.abs(np.array(ob.matrix_world)) < 1e15).all()):
+            self.broken = True
+            self.poses.append(np.eye(4))
+            self.lens.append({})
+            return
         lens = {"near": data.clip_start, "far": data.clip_end, "focal": data.lens}
         if data.type == "ORTHO":
             # P = diag(1/xmag, 1/ymag, ..) with the window's centre in the last column.
@@ -59,11 +66,17 @@ class CameraTrack:
         self.poses.append(view_matrix(ob.matrix_world))
         self.lens.append(lens)
 
-    def write(self, document: Document, animation: Animation, lost: Lost) -> int:
-        """Add camera, node and channels; the node's index."""
+    def write(self, document: Document, animation: Animation, lost: Lost) -> None:
+        """Add camera, node and channels; none where there is no way to look through the camera."""
         data, first = self.source.data, self.lens[0]
         name = self.source.name
-        ortho = data.type == "ORTHO"
+        if self.broken:
+            lost.add(name, "lens or transform that is no usable number", "the camera is left out; check its clipping, scale, constraints and drivers")
+            return
+        ortho = "xmag" in first
+        if any(("xmag" in lens) != ortho for lens in self.lens):
+            lost.add(name, "projection that changes from perspective to orthographic", "the first one is kept; use two cameras and a cut")
+            self.lens = [lens if ("xmag" in lens) == ortho else first for lens in self.lens]
         values = {key: np.array([sample[key] for sample in self.lens]) for key in first}
         if data.type not in ("ORTHO", "PERSP"):
             action = "only perspective and orthographic cameras are carried; it is exported as perspective"
@@ -95,14 +108,13 @@ class CameraTrack:
         animation.pointer(f"/cameras/{index}/extras/shift", shift)
         if "dof" in camera["extras"]:
             animation.pointer(f"/cameras/{index}/extras/dof/focus_distance", values["focus"])
-        return self.node
 
     def _extras(self, values: dict[str, np.ndarray]) -> dict:
         data, first = self.source.data, self.lens[0]
         extras: dict = {"clip": [tidy(first["near"]), tidy(first["far"])]}
         if np.abs(values["shift_x"]).max() > 0 or np.abs(values["shift_y"]).max() > 0:
             extras["shift"] = [float(first["shift_x"]), float(first["shift_y"])]
-        if data.type != "ORTHO":
+        if "xmag" not in first:
             # The film area that the picture covers: size = 2 f tan(half angle) = 2 f / P.
             extras["sensor"] = [tidy(2 * first["focal"] / first["p00"]), tidy(2 * first["focal"] / first["p11"])]
         if data.dof.use_dof:

@@ -195,6 +195,9 @@ class _Export:
             bound = [(frame, ob.name) for frame, ob in cameras.marker_cuts(self.scene)]
             if not bound and self.scene.camera is not None:
                 bound = [(first, self.scene.camera.name)]
+        for _, name in bound:
+            if nodes.get(name) == -1:
+                raise InputError(f"camera {name!r}: its lens or transform is no usable number; check its clipping, scale, constraints and drivers")
         cuts = [{"frame": frame, "camera": name, "node": nodes[name]} for frame, name in bound if name in nodes]
         if not cuts:
             self.lost.add(self.scene.name, "no camera", "add a camera to the scene, or convert with --turntable")

@@ -7,6 +7,7 @@ import math
 
 import numpy as np
 import pytest
+from exporters.common.report import InputError
 
 CASES = {
     "plain": {},
@@ -178,3 +179,37 @@ def test_panoramic_camera_is_named(blender, export):
     ob = b.camera()
     ob.data.type = "PANO"
     assert "pano camera" in export().lost_features("Camera")
+
+
+@pytest.mark.parametrize("first", ["PERSP", "ORTHO"])
+def test_a_projection_that_changes_is_held_and_named(blender, export, first):
+    import blender_scene as b
+
+    camera = b.camera()
+    other = {"PERSP": "ORTHO", "ORTHO": "PERSP"}[first]
+    b.key(camera.data, "type", {1: first, 2: other}, interpolation="CONSTANT")
+    gltf = export()
+    assert gltf.root["cameras"][0]["type"] == {"PERSP": "perspective", "ORTHO": "orthographic"}[first]
+    assert gltf.lost_features("Camera") == ["projection that changes from perspective to orthographic"]
+    want = b.expected_projection(camera, b.set_frame(1))
+    for frame in (1, 2):
+        np.testing.assert_allclose(gltf.clip_from_camera(gltf.node("Camera"), frame)[:2], want[:2], atol=1e-5)
+
+
+@pytest.mark.parametrize("case", ["clipping", "scale", "place"])
+def test_a_camera_without_a_picture_stops_only_its_own_shots(blender, export, case):
+    import blender_scene as b
+
+    b.camera()
+    bad = b.camera("Bad")
+    if case == "clipping":
+        bad.data.clip_start = bad.data.clip_end = 1
+    elif case == "scale":
+        bad.data.type, bad.data.ortho_scale = "ORTHO", 0
+    else:
+        bad.location.x = math.nan
+    gltf = export()
+    assert [camera["name"] for camera in gltf.root["cameras"]] == ["Camera"]
+    assert gltf.lost_features("Bad") == ["lens or transform that is no usable number"]
+    with pytest.raises(InputError, match="camera 'Bad': its lens or transform is no usable number"):
+        export(camera="Bad")
