@@ -24,7 +24,7 @@ _VALUES = {"Metallic": "Blue", "Roughness": "Green", "Alpha": "Red", "Transmissi
 
 def bake_procedural(scene: bpy.types.Scene, size: int, progress: Callable[[str], None]) -> None:
     """Replace procedural inputs of Principled materials by baked images, on every mesh of the scene that has them."""
-    slots = [(ob, slot) for ob in scene.collection.objects for slot in ob.material_slots if slot.material is not None and slot.material.use_nodes]
+    slots = [(ob, slot) for ob in scene.collection.objects for slot in ob.material_slots if slot.material.use_nodes]
     for material in {slot.material for _, slot in slots}:
         make_plain(material.node_tree)
     jobs = [(ob, slot, inputs) for ob, slot in slots if (inputs := _to_bake(ob, slot.material))]
@@ -141,7 +141,7 @@ def _bake(scene: bpy.types.Scene, ob: bpy.types.Object, slot: bpy.types.Material
     others = []
     for other in ob.material_slots:
         # Every material of the object needs an active image, or Blender refuses to bake.
-        if other.slot_index != slot.slot_index and other.material is not None and other.material.node_tree is not None:
+        if other.slot_index != slot.slot_index and other.material.node_tree is not None:
             nodes = other.material.node_tree.nodes
             spare = nodes.new("ShaderNodeTexImage")
             spare.image = bpy.data.images.new("spare", 4, 4)

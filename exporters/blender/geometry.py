@@ -107,14 +107,16 @@ class GeometryStore:
         self.shapes.append(Shape(ob.original.data.name if ob.original.data else ob.name, mesh, topology))
         return len(self.shapes) - 1
 
-    def build(self, scene: bpy.types.Scene, samples: np.ndarray) -> None:
+    def build(self, scene: bpy.types.Scene, samples: np.ndarray, override: bpy.types.Material | None) -> None:
         """Link one object for each shape into `scene`, named by its number, with shape keys for its key poses.
 
-        `samples` are the frames of the samples in the order in which they were taken.
+        `samples` are the frames of the samples in the order in which they were taken; `override` is the material of all.
         """
+        default = _default_surface()
         for number, shape in enumerate(self.shapes):
             ob = bpy.data.objects.new(f"shape-{number}", shape.mesh)
             shape.mesh.name = shape.name
+            _fill_slots(shape.mesh, override, default)
             scene.collection.objects.link(ob)
             if len(shape.poses) > 1:
                 self._key_poses(ob, shape, samples)
@@ -146,6 +148,22 @@ def may_deform(ob: bpy.types.Object) -> bool:
     if source.type == "META" or is_animated(data) or getattr(data, "shape_keys", None) is not None:
         return True
     return any(getattr(data, other, None) is not None for other in _SHAPED_BY)
+
+
+def _fill_slots(mesh: bpy.types.Mesh, override: bpy.types.Material | None, default: bpy.types.Material) -> None:
+    """Give every slot a material, and a mesh without slots one."""
+    if not mesh.materials:
+        mesh.materials.append(None)
+    for i, material in enumerate(mesh.materials):
+        mesh.materials[i] = override or material or default
+
+
+def _default_surface() -> bpy.types.Material:
+    """What Blender shows where there is no material; glTF would have rough metal there."""
+    material = bpy.data.materials.new("Default Surface")
+    if material.node_tree is None:
+        material.use_nodes = True
+    return material
 
 
 def _slots_of_object(ob: bpy.types.Object) -> bool:

@@ -121,11 +121,11 @@ class _Export:
         shapes = sampler.geometry.shapes
         temporary = bpy.data.scenes.new("export")
         bpy.context.window.scene = temporary
-        sampler.geometry.build(temporary, np.array(sampler.taken))
+        sampler.geometry.build(temporary, np.array(sampler.taken), self.view_layer.material_override)
         if self.options.bake:
             bake_procedural(temporary, self.options.bake, self.options.progress)
         slots = [slot.material for ob in temporary.collection.objects for slot in ob.material_slots]
-        prepare_materials([m for m in dict.fromkeys(slots) if m is not None], self.lost)
+        prepare_materials(list(dict.fromkeys(slots)), self.lost)
         target = self.output.folder / f"{self.output.stem}{self.output.path.suffix}"
         if shapes:
             _call_exporter(target)

@@ -29,6 +29,8 @@ def name_scene_losses(scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer, l
     for camera in {m.camera for m in scene.timeline_markers if m.camera} | {scene.camera}:
         if camera is not None and camera.type == "CAMERA" and camera.data.dof.use_dof:
             lost.add(camera.name, "depth of field", "it is not rendered; use depth.Z in compositing")
+    if not view_layer.use_solid:
+        lost.add(view_layer.name, "view layer without surfaces", "they are rendered; hide the objects from the render")
     _name_layers(view_layer.layer_collection, lost)
     for ob in scene.objects:
         if ob.hide_render:

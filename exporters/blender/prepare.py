@@ -16,6 +16,9 @@ _LEVELS = (("levels", "render_levels"), ("screw_steps", "render_steps"), ("steps
 def prepare(scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer) -> None:
     """Set everything that differs between viewport and render to the render's value."""
     _leave_edit_mode(view_layer)
+    scene.world = getattr(view_layer, "world_override", None) or scene.world
+    if not view_layer.use_sky:
+        scene.world = None
     if scene.render.use_simplify:
         scene.render.simplify_subdivision = scene.render.simplify_subdivision_render
         scene.render.simplify_child_particles = scene.render.simplify_child_particles_render

@@ -315,6 +315,44 @@ def test_materials_of_slots_of_the_object(blender, export):
     assert used == {"A": "Red", "B": "Blue"}
 
 
+def test_what_has_no_material_is_as_in_blender(blender, export):
+    """No slot, an empty slot beside a full one, text, and an instance: base colour 0.8, no metal."""
+    import blender_scene as b
+
+    b.camera()
+    bare = b.cube("Bare")
+    half = b.cube("Half")
+    half.data.materials.append(b.material()[0])
+    half.data.materials.append(None)
+    half.data.polygons[0].material_index = 1
+    text = b.link(blender.data.objects.new("Text", blender.data.curves.new("Text", "FONT")))
+    text.data.body, text.data.extrude = "a", 0.1
+    collection = blender.data.collections.new("Kept")
+    collection.objects.link(b.mesh("Inside", [(0, 0, 0), (1, 0, 0), (0, 1, 0)], [(0, 1, 2)]))
+    empty = b.link(blender.data.objects.new("Instance", None))
+    empty.instance_type, empty.instance_collection = "COLLECTION", collection
+    bare.data.color_attributes.new("Tint", "BYTE_COLOR", "CORNER").data.foreach_set("color", [0.0] * 24 * 4)
+    gltf = export()
+    used = [p["material"] for m in gltf.root["meshes"] for p in m["primitives"]]
+    assert sorted(gltf.root["materials"][i]["name"] for i in set(used)) == ["Default Surface", "Grey"]
+    shader = next(m for m in gltf.root["materials"] if m["name"] == "Default Surface")["pbrMetallicRoughness"]
+    assert shader["baseColorFactor"] == pytest.approx([0.8, 0.8, 0.8, 1])
+    assert (shader["metallicFactor"], shader.get("roughnessFactor")) == (0, 0.5)
+    # Blender's exporter adds white colours, so that the others count for nothing.
+    colours = {p["attributes"]["COLOR_0"] for m in gltf.root["meshes"] for p in m["primitives"] if "COLOR_0" in p["attributes"]}
+    assert [np.unique(gltf.accessor(i)).tolist() for i in colours] == [[255]]
+
+
+def test_material_override(blender, export):
+    import blender_scene as b
+
+    b.camera()
+    b.cube("Bare")
+    b.cube("Full").data.materials.append(b.material()[0])
+    blender.context.view_layer.material_override = b.material("Clay")[0]
+    assert [m["name"] for m in export().root["materials"]] == ["Clay"]
+
+
 def test_particles(blender, export):
     import blender_scene as b
 

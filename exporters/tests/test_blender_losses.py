@@ -21,3 +21,11 @@ def test_film_layers_and_shadows(blender, export):
     assert "--exposure 1 " in exposure["action"]
     assert gltf.lost_features("Floating") == ["without a shadow"]
     assert (gltf.lost_features("Mask"), gltf.lost_features("Off")) == (["holdout collection"], [])
+
+
+def test_a_view_layer_without_surfaces_is_named(blender, export):
+    import blender_scene as b
+
+    b.camera()
+    blender.context.view_layer.use_solid = False
+    assert export().lost_features("ViewLayer") == ["view layer without surfaces"]

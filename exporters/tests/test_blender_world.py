@@ -180,3 +180,14 @@ def test_what_a_world_loses_is_named(blender, export):
     tree.links.new(path.outputs["Is Camera Ray"], background.inputs["Strength"])
     blender.context.scene.world.cycles_visibility.camera = False
     assert set(export().lost_features("World")) == {"light path in the world", "world hidden from the camera"}
+
+
+def test_the_view_layer_decides_about_the_world(blender, export):
+    world(blender)
+    layer = blender.context.view_layer
+    if hasattr(layer, "world_override"):
+        layer.world_override = blender.data.worlds.new("Other")
+        layer.world_override.node_tree.nodes["Background"].inputs["Color"].default_value = (1, 0, 0, 1)
+        assert export().buzz["world"]["color"] == [1, 0, 0]
+    layer.use_sky = False
+    assert export().buzz["world"]["color"] == [0, 0, 0]
