@@ -91,7 +91,7 @@ class _Export:
         name_scene_losses(self.scene, self.view_layer, self.lost)
         self.options.progress(f"sampling frames {self.frames[0]}-{self.frames[1]}")
         sampler = Sampler(self.scene, self.view_layer, self.size, self.lost)
-        sky: list[tuple[float, ...]] = []
+        sky: list[dict[str, Any]] = []
         sampler.on_sample = lambda: sky.append(world.sample_world(self.scene))
         sampler.run(*self.frames)
         sky = [sky[i] for i in np.argsort(np.array(sampler.taken), kind="stable")]
@@ -107,9 +107,8 @@ class _Export:
             light.write(document, animation, self.lost)
         for camera in sampler.cameras:
             camera.write(document, animation, self.lost)
-        surround = world.export_world(self.scene, self.output.folder, self.output.stem, self.lost)
-        if surround is not None:
-            world.animate_world(animation, sky, surround)
+        surround, followed = world.export_world(self.scene, self.output.folder, self.output.stem, self.lost)
+        world.animate_world(animation, sky, followed)
         if not document.root.get("extensions", {}).get("KHR_lights_punctual") and _dark(surround):
             self.lost.add(self.scene.name, "no light", "no light is visible in the render and the world is black; show a light, or only emission is seen")
         animation.close()
@@ -203,7 +202,7 @@ class _Export:
             self.lost.add(self.scene.name, "no camera", "add a camera to the scene, or convert with --turntable")
         return extras.simplify_cuts(cuts, first, last)
 
-    def _finish(self, document: Document, fps: tuple[int, int], cuts: list[dict], surround: dict | None) -> None:
+    def _finish(self, document: Document, fps: tuple[int, int], cuts: list[dict], surround: dict) -> None:
         """Scene, extras, check, save."""
         render = self.scene.render
         nodes = document.root.get("nodes", [])
@@ -231,9 +230,9 @@ class _Export:
         self.output.publish(document)
 
 
-def _dark(surround: dict | None) -> bool:
+def _dark(surround: dict) -> bool:
     """Whether a world sheds no light (an animated one may later)."""
-    return surround is None or ("image" not in surround and (surround["strength"] == 0 or not any(surround["color"])))
+    return "image" not in surround and (surround["strength"] == 0 or not any(surround["color"]))
 
 
 def _choose_scene(name: str | None) -> bpy.types.Scene:

@@ -12,7 +12,7 @@ import bpy
 import numpy as np
 
 from ..common.report import Lost
-from .nodes import CONSTANTS, NORMALS, source, trees, unreadable_inputs, upstream
+from .nodes import CONSTANTS, NORMALS, drop_muted, source, trees, unreadable_inputs, upstream
 from .prepare import is_animated
 
 # The property of a baked image's node that says what in it depends on the object's place or the view.
@@ -49,8 +49,7 @@ def prepare_materials(materials: list[bpy.types.Material], lost: Lost) -> None:
 
 def make_plain(tree: bpy.types.NodeTree) -> None:
     """Rebuild with a Principled BSDF what looks the same with one; called before baking, and again where that is off."""
-    for link in [link for link in tree.links if link.is_muted]:
-        tree.links.remove(link)
+    drop_muted(tree)
     surface = output_of(tree).inputs["Surface"]
     old = surface.links[0].from_node if surface.is_linked else None
     settings = _as_principled(tree, old)

@@ -63,6 +63,19 @@ def upstream(socket: bpy.types.NodeSocket) -> Iterator[bpy.types.NodeSocket]:
             links += out.node.node_tree.links
 
 
+def drop_muted(tree: bpy.types.NodeTree) -> None:
+    """Take out muted links, and muted shaders as Blender passes over them: for their first input, or for black."""
+    for link in [link for link in tree.links if link.is_muted]:
+        tree.links.remove(link)
+    for node in [node for node in tree.nodes if node.mute]:
+        for link in [link for out in node.outputs if out.type == "SHADER" for link in out.links]:
+            target = link.to_socket
+            passed = next((inner.from_socket for inner in node.internal_links if inner.to_socket == link.from_socket), None)
+            tree.links.remove(link)
+            if passed is not None and passed.is_linked:
+                tree.links.new(passed.links[0].from_socket, target)
+
+
 def placed(socket: bpy.types.NodeSocket) -> str | None:
     """What before an input depends on the object's place, its instance or the view."""
     return next((_label(out.node) for out in upstream(socket) if _is_placed(out)), None)

@@ -9,6 +9,8 @@ from __future__ import annotations
 
 import bpy
 
+from .nodes import drop_muted
+
 # (viewport, render) pairs of properties that modifiers, curves, metaballs and particle settings have.
 _LEVELS = (("levels", "render_levels"), ("screw_steps", "render_steps"), ("steps", "render_steps"))
 
@@ -19,6 +21,8 @@ def prepare(scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer) -> None:
     scene.world = getattr(view_layer, "world_override", None) or scene.world
     if not view_layer.use_sky:
         scene.world = None
+    if scene.world is not None and scene.world.node_tree is not None:
+        drop_muted(scene.world.node_tree)
     if scene.render.use_simplify:
         scene.render.simplify_subdivision = scene.render.simplify_subdivision_render
         scene.render.simplify_child_particles = scene.render.simplify_child_particles_render

@@ -20,42 +20,55 @@ from ..common.extras import tidy
 from ..common.motion import Animation
 from ..common.report import Lost
 from ..common.srgb import decoded
-from .prepare import is_animated
+from .nodes import source, upstream
+from .prepare import action_curves, is_animated
 
 _READABLE = {".hdr", ".exr", ".png", ".jpg", ".jpeg"}
 _BAKED_WIDTH = 1024
 
 
-def export_world(scene: bpy.types.Scene, folder: Path, stem: str, lost: Lost) -> dict[str, Any] | None:
-    """The value of `extras.buzz.world`; an image is put into `folder`."""
+def export_world(scene: bpy.types.Scene, folder: Path, stem: str, lost: Lost) -> tuple[dict[str, Any], tuple[str, ...]]:
+    """The value of `extras.buzz.world`, an image of which is put into `folder`; and what in it `sample_world` follows."""
+    black = {"color": [0, 0, 0], "strength": 1}
     world = scene.world
     if world is None:
-        return {"color": [0, 0, 0], "strength": 1}
+        return black, ()
     tree = world.node_tree if world.use_nodes else None
     if tree is None:
-        return {"color": [tidy(c) for c in world.color], "strength": 1}
-    output = next((n for n in tree.nodes if n.type == "OUTPUT_WORLD" and n.is_active_output), None)
-    if output is None or not output.inputs["Surface"].is_linked:
-        return {"color": [0, 0, 0], "strength": 1}
-    if output.inputs["Volume"].is_linked:
+        return {"color": [tidy(c) for c in world.color], "strength": 1}, ("color",)
+    surface = _surface(tree)
+    if surface is None:
+        return black, ()
+    if _output(tree).inputs["Volume"].is_linked:
         lost.add(world.name, "world volume", "render the mist in compositing, from depth.Z")
     _name_losses(world, tree, lost)
-    background = output.inputs["Surface"].links[0].from_node
-    if background.type == "BACKGROUND" and not background.inputs["Strength"].is_linked:
-        strength = max(float(background.inputs["Strength"].default_value), 0.0)
-        colour = background.inputs["Color"]
+    if surface.type == "BACKGROUND" and not surface.inputs["Strength"].is_linked:
+        colour, strength = surface.inputs["Color"], surface.inputs["Strength"]
+        shone = tidy(max(float(strength.default_value), 0.0))
         if not colour.is_linked:
-            return {"color": [tidy(max(c, 0)) for c in colour.default_value[:3]], "strength": tidy(strength)}
-        image = _environment(colour.links[0].from_node)
+            _name_animation(world, tree, [colour, strength], lost)
+            return {"color": [tidy(max(c, 0)) for c in colour.default_value[:3]], "strength": shone}, ("color", "strength")
+        image = _environment(source(colour))
         if image is not None:
             uri = _put_image(image[0], folder, stem)
             if uri is None:
                 lost.add(world.name, f"image {image[0].name!r} is missing", "find it with File > External Data > Find Missing Files; the world is black")
-                return {"color": [0, 0, 0], "strength": 1}
-            return {"color": [1, 1, 1], "strength": tidy(strength), "image": quote(uri), "rotation": tidy(image[1])}
-    if is_animated(tree):
-        lost.add(world.name, "animated world nodes", "the sky of the first frame is used; animate only colour and strength of a Background node")
-    return {"color": [1, 1, 1], "strength": 1, "image": quote(_bake(scene, folder, stem)), "rotation": 0}
+                return black, ()
+            _name_animation(world, tree, [strength], lost)
+            return {"color": [1, 1, 1], "strength": shone, "image": quote(uri), "rotation": tidy(image[1])}, ("strength",)
+    _name_animation(world, tree, [], lost)
+    return {"color": [1, 1, 1], "strength": 1, "image": quote(_bake(scene, folder, stem)), "rotation": 0}, ()
+
+
+def _output(tree: bpy.types.NodeTree) -> bpy.types.Node | None:
+    return next((n for n in tree.nodes if n.type == "OUTPUT_WORLD" and n.is_active_output), None)
+
+
+def _surface(tree: bpy.types.NodeTree) -> bpy.types.Node | None:
+    """The node that the sky is; None where it is black."""
+    output = _output(tree)
+    shown = source(output.inputs["Surface"]) if output is not None else None
+    return shown.node if shown is not None else None
 
 
 def _name_losses(world: bpy.types.World, tree: bpy.types.NodeTree, lost: Lost) -> None:
@@ -68,27 +81,40 @@ def _name_losses(world: bpy.types.World, tree: bpy.types.NodeTree, lost: Lost) -
         lost.add(world.name, "sun disc in the sky texture", "it throws no shadow with an edge; turn Sun Disc off and add a Sun light")
 
 
-def animate_world(animation: Animation, samples: list[tuple[float, ...]], world: dict[str, Any]) -> None:
-    """Channels for the colour and strength of a plain background that change."""
-    values = np.array(samples)
-    if "image" not in world:
-        animation.pointer("/scenes/0/extras/buzz/world/color", np.maximum(values[:, :3], 0))
-    animation.pointer("/scenes/0/extras/buzz/world/strength", np.maximum(values[:, 3], 0))
+def _name_animation(world: bpy.types.World, tree: bpy.types.NodeTree, followed: list[bpy.types.NodeSocket], lost: Lost) -> None:
+    """What changes in the sky other than the inputs that are followed."""
+    nodes = {out.node for out in upstream(_output(tree).inputs["Surface"])}
+    data = tree.animation_data
+    paths = {curve.data_path for curve in [*action_curves(tree), *(data.drivers if data else [])]}
+    paths -= {socket.path_from_id("default_value") for socket in followed}
+    moves = any(path.startswith(f"{node.path_from_id()}.") for path in paths for node in nodes if node.id_data == tree)
+    moves = moves or any(is_animated(node.id_data) for node in nodes if node.id_data != tree)
+    moves = moves or any(strip for track in (data.nla_tracks if data else []) for strip in track.strips)
+    movies = any(node.type == "TEX_ENVIRONMENT" and node.image is not None and node.image.source in ("SEQUENCE", "MOVIE") for node in nodes)
+    if moves or movies:
+        lost.add(world.name, "animated world nodes", "the sky of the first frame is used; only colour and strength of a plain Background node are followed")
 
 
-def sample_world(scene: bpy.types.Scene) -> tuple[float, ...]:
-    """Colour and strength of the Background node now."""
+def animate_world(animation: Animation, samples: list[dict[str, Any]], followed: tuple[str, ...]) -> None:
+    """Channels for what of a world is followed."""
+    for key in followed:
+        animation.pointer(f"/scenes/0/extras/buzz/world/{key}", np.maximum([sample[key] for sample in samples], 0))
+
+
+def sample_world(scene: bpy.types.Scene) -> dict[str, Any]:
+    """Colour and strength now; only of a Background node is either followed."""
     world = scene.world
     tree = world.node_tree if world is not None and world.use_nodes else None
-    node = next((n for n in tree.nodes if n.type == "BACKGROUND"), None) if tree else None
-    if node is None:
-        return (*(world.color if world else (0, 0, 0)), 1.0)
-    return (*node.inputs["Color"].default_value[:3], node.inputs["Strength"].default_value)
+    surface = _surface(tree) if tree is not None else None
+    if surface is None or surface.type != "BACKGROUND":
+        return {"color": tuple(world.color) if world is not None else (0, 0, 0), "strength": 1.0}
+    return {"color": tuple(surface.inputs["Color"].default_value[:3]), "strength": surface.inputs["Strength"].default_value}
 
 
-def _environment(node: bpy.types.Node) -> tuple[bpy.types.Image, float] | None:
+def _environment(out: bpy.types.NodeSocket | None) -> tuple[bpy.types.Image, float] | None:
     """Image and rotation of an equirectangular Environment Texture turned about the vertical at most, else None."""
-    if node.type != "TEX_ENVIRONMENT" or node.image is None or node.projection != "EQUIRECTANGULAR":
+    node = out.node if out is not None else None
+    if node is None or node.mute or node.type != "TEX_ENVIRONMENT" or node.image is None or node.projection != "EQUIRECTANGULAR":
         return None
     if node.image.source not in ("FILE", "GENERATED"):
         return None
@@ -96,13 +122,13 @@ def _environment(node: bpy.types.Node) -> tuple[bpy.types.Image, float] | None:
     if not vector.is_linked:
         return node.image, 0.0
     mapping = vector.links[0].from_node
-    if mapping.type != "MAPPING":
+    if mapping.mute or mapping.type != "MAPPING":
         plain = mapping.type == "TEX_COORD" and vector.links[0].from_socket.name == "Generated"
         return (node.image, 0.0) if plain else None
     if any(mapping.inputs[n].is_linked for n in ("Location", "Rotation", "Scale") if n in mapping.inputs):
         return None
-    source = mapping.inputs["Vector"]
-    if source.is_linked and (source.links[0].from_node.type != "TEX_COORD" or source.links[0].from_socket.name != "Generated"):
+    where = source(mapping.inputs["Vector"])
+    if where is not None and (where.node.type != "TEX_COORD" or where.name != "Generated"):
         return None
     location = mapping.inputs["Location"].default_value if "Location" in mapping.inputs else (0, 0, 0)
     rotation, scale = mapping.inputs["Rotation"].default_value, mapping.inputs["Scale"].default_value
@@ -120,8 +146,8 @@ def _put_image(image: bpy.types.Image, folder: Path, stem: str) -> str | None:
     suffix = Path(image.filepath_raw or image.name).suffix.lower()
     linear = image.colorspace_settings.name.startswith(("Linear", "scene_linear"))
     eight_bit = suffix in (".png", ".jpg", ".jpeg")
-    source = Path(bpy.path.abspath(image.filepath_raw, library=image.library)) if image.filepath_raw else None
-    missing = image.source == "FILE" and not image.packed_file and not (source and source.is_file())
+    original = Path(bpy.path.abspath(image.filepath_raw, library=image.library)) if image.filepath_raw else None
+    missing = image.source == "FILE" and not image.packed_file and not (original and original.is_file())
     if missing or not image.size[0]:
         return None
     if image.source == "FILE" and suffix in _READABLE and eight_bit != linear:
@@ -129,8 +155,8 @@ def _put_image(image: bpy.types.Image, folder: Path, stem: str) -> str | None:
         if image.packed_file:
             target.write_bytes(image.packed_file.data)
             return target.name
-        if source and source.is_file():
-            shutil.copyfile(source, target)
+        if original and original.is_file():
+            shutil.copyfile(original, target)
             return target.name
     # Anything else (generated, other formats, unusual colour spaces): the pixels, linear, as OpenEXR.
     target = folder / f"{stem}_world.exr"

@@ -348,3 +348,21 @@ def test_constant_nodes_are_folded(blender, surface, export):
     gltf = export(bake=0)
     assert not gltf.lost.items
     assert material_of(gltf)["extensions"]["KHR_materials_transmission"]["transmissionFactor"] == 0.5
+
+
+def test_what_is_muted_is_passed_over(blender, surface, export):
+    tree = surface.id_data
+    end = surface.outputs[0].links[0].to_socket
+    surface.inputs["Base Color"].default_value = (0, 1, 0, 1)
+    mix = node(surface, "MixShader", mute=True)
+    link(surface.outputs[0], mix.inputs[1])
+    link(node(surface, "Emission").outputs[0], mix.inputs[2])
+    tree.links.new(mix.outputs[0], end)
+    gltf = export()
+    assert material_of(gltf)["pbrMetallicRoughness"]["baseColorFactor"] == [0, 1, 0, 1]
+    assert gltf.lost_features("Grey") == []
+
+
+def test_a_muted_shader_is_black(blender, surface, export):
+    surface.mute = True
+    assert material_of(export())["pbrMetallicRoughness"]["baseColorFactor"] == [0, 0, 0, 1]

@@ -191,3 +191,66 @@ def test_the_view_layer_decides_about_the_world(blender, export):
         assert export().buzz["world"]["color"] == [1, 0, 0]
     layer.use_sky = False
     assert export().buzz["world"]["color"] == [0, 0, 0]
+
+
+@pytest.mark.parametrize("muted", ["node", "link"])
+def test_a_muted_sky_is_black(blender, export, muted):
+    background, _ = world(blender)
+    what = background if muted == "node" else background.outputs[0].links[0]
+    setattr(what, "mute" if muted == "node" else "is_muted", True)
+    assert export().buzz["world"]["color"] == [0, 0, 0]
+
+
+def test_a_muted_mixture_shows_its_first_sky(blender, export):
+    background, tree = world(blender)
+    background.inputs["Color"].default_value = (0, 1, 0, 1)
+    mix = tree.nodes.new("ShaderNodeAddShader")
+    end = background.outputs[0].links[0].to_socket
+    tree.links.new(background.outputs[0], mix.inputs[0])
+    tree.links.new(mix.outputs[0], end)
+    mix.mute = True
+    assert export().buzz["world"] == {"color": [0, 1, 0], "strength": 1}
+
+
+STRENGTH = "/scenes/0/extras/buzz/world/strength"
+
+
+def test_only_the_background_that_is_shown_is_followed(blender, export):
+    import blender_scene as b
+
+    first, tree = world(blender)
+    shown = tree.nodes.new("ShaderNodeBackground")
+    tree.links.new(shown.outputs[0], first.outputs[0].links[0].to_socket)
+    shown.inputs["Strength"].default_value = 3
+    b.key(first.inputs["Strength"], "default_value", {1: 1.0, 2: 9.0})
+    gltf = export()
+    assert gltf.buzz["world"]["strength"] == 3
+    assert not gltf.animated(STRENGTH) and gltf.lost_features("World") == []
+
+
+def test_a_baked_sky_holds_its_strength(blender, export, monkeypatch):
+    import blender_scene as b
+
+    monkeypatch.setattr("exporters.blender.world._BAKED_WIDTH", 16)
+    background, tree = world(blender)
+    gradient = tree.nodes.new("ShaderNodeTexGradient")
+    tree.links.new(gradient.outputs["Color"], background.inputs["Color"])
+    b.key(background.inputs["Strength"], "default_value", {1: 2.0, 2: 8.0})
+    gltf = export()
+    assert not gltf.animated(STRENGTH)
+    assert gltf.lost_features("World") == ["animated world nodes"]
+
+
+def test_a_turning_image_is_named_and_its_strength_followed(blender, export, tmp_path):
+    import blender_scene as b
+
+    background, tree = world(blender)
+    node = environment(blender, tree, background, tmp_path, ".hdr")
+    mapping = tree.nodes.new("ShaderNodeMapping")
+    tree.links.new(mapping.outputs["Vector"], node.inputs["Vector"])
+    b.key(background.inputs["Strength"], "default_value", {1: 1.0, 2: 2.0})
+    assert export().lost_features("World") == []
+    b.key(mapping.inputs["Rotation"], "default_value", {1: (0, 0, 0), 2: (0, 0, 3)})
+    gltf = export()
+    assert gltf.lost_features("World") == ["animated world nodes"]
+    assert gltf.value(STRENGTH, 2, 0.0) == 2
