@@ -15,6 +15,7 @@ import numpy as np
 
 from ..common.morph import choose_targets
 from ..common.report import Lost
+from .materials import default_surface, own_copy
 from .prepare import is_animated
 
 # Modifiers that may change what of a mesh is not its vertices' positions.
@@ -112,11 +113,11 @@ class GeometryStore:
 
         `samples` are the frames of the samples in the order in which they were taken; `override` is the material of all.
         """
-        default = _default_surface()
+        made: dict[bpy.types.Material | None, bpy.types.Material] = {}
         for number, shape in enumerate(self.shapes):
             ob = bpy.data.objects.new(f"shape-{number}", shape.mesh)
             shape.mesh.name = shape.name
-            _fill_slots(shape.mesh, override, default)
+            _fill_slots(shape.mesh, override, made)
             scene.collection.objects.link(ob)
             if len(shape.poses) > 1:
                 self._key_poses(ob, shape, samples)
@@ -150,20 +151,17 @@ def may_deform(ob: bpy.types.Object) -> bool:
     return any(getattr(data, other, None) is not None for other in _SHAPED_BY)
 
 
-def _fill_slots(mesh: bpy.types.Mesh, override: bpy.types.Material | None, default: bpy.types.Material) -> None:
-    """Give every slot a material, and a mesh without slots one."""
+def _fill_slots(mesh: bpy.types.Mesh, override: bpy.types.Material | None, made: dict[bpy.types.Material | None, bpy.types.Material]) -> None:
+    """Give every slot a material that can be changed, and a mesh without slots one; `made` holds those that are made for it."""
     if not mesh.materials:
         mesh.materials.append(None)
     for i, material in enumerate(mesh.materials):
-        mesh.materials[i] = override or material or default
-
-
-def _default_surface() -> bpy.types.Material:
-    """What Blender shows where there is no material; glTF would have rough metal there."""
-    material = bpy.data.materials.new("Default Surface")
-    if material.node_tree is None:
-        material.use_nodes = True
-    return material
+        material = override or material
+        if material is None or material.library:
+            if material not in made:
+                made[material] = default_surface() if material is None else own_copy(material)
+            material = made[material]
+        mesh.materials[i] = material
 
 
 def _slots_of_object(ob: bpy.types.Object) -> bool:

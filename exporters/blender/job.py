@@ -25,6 +25,7 @@ from ..common.document import Document
 from ..common.report import ExportError, InputError, Lost
 from . import cameras, world
 from .bake import bake_procedural
+from .images import name_as_files
 from .losses import name_scene_losses
 from .materials import prepare_materials
 from .output import GENERATOR, Output
@@ -123,12 +124,15 @@ class _Export:
         sampler.geometry.build(temporary, np.array(sampler.taken), self.view_layer.material_override)
         if self.options.bake:
             bake_procedural(temporary, self.options.bake, self.options.progress)
-        slots = [slot.material for ob in temporary.collection.objects for slot in ob.material_slots]
-        prepare_materials(list(dict.fromkeys(slots)), self.lost)
+        materials = list(dict.fromkeys(slot.material for ob in temporary.collection.objects for slot in ob.material_slots))
+        prepare_materials(materials, self.lost)
+        artist = name_as_files(materials)
         target = self.output.folder / f"{self.output.stem}{self.output.path.suffix}"
         if shapes:
             _call_exporter(target)
             document = Document.load(target)
+            for image in document.root.get("images", []):
+                image["name"] = artist.get(image["name"], image["name"])
         else:
             document = Document()
         bpy.context.window.scene = self.scene

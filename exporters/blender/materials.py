@@ -47,6 +47,29 @@ def prepare_materials(materials: list[bpy.types.Material], lost: Lost) -> None:
             _name_losses(shader, meshes_of(material), material.name, lost)
 
 
+def default_surface() -> bpy.types.Material:
+    """What Blender shows where there is no material; glTF would have rough metal there."""
+    material = bpy.data.materials.new("Default Surface")
+    if material.node_tree is None:
+        material.use_nodes = True
+    return material
+
+
+def own_copy(material: bpy.types.Material) -> bpy.types.Material:
+    """A material of a library, with its node groups, as one of this file: nothing can be linked to nodes of another."""
+    copy = material.copy()
+    made: dict[bpy.types.NodeTree, bpy.types.NodeTree] = {}
+    found = [copy.node_tree] if copy.node_tree is not None else []
+    for tree in found:
+        for node in tree.nodes:
+            if node.type == "GROUP" and node.node_tree is not None and node.node_tree.library:
+                if node.node_tree not in made:
+                    made[node.node_tree] = node.node_tree.copy()
+                    found.append(made[node.node_tree])
+                node.node_tree = made[node.node_tree]
+    return copy
+
+
 def make_plain(tree: bpy.types.NodeTree) -> None:
     """Rebuild with a Principled BSDF what looks the same with one; called before baking, and again where that is off."""
     drop_muted(tree)
