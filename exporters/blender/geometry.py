@@ -35,6 +35,18 @@ class Shape:
     poses: dict[int, np.ndarray] = field(default_factory=dict)
     mesh_index: int | None = None
     weights: np.ndarray | None = None
+    _distinct: dict[bytes, np.ndarray] = field(default_factory=dict)
+
+    def take_pose(self, sample: int, positions: np.ndarray) -> None:
+        """Record vertex positions; equal ones are held once."""
+        key = hashlib.blake2b(positions, digest_size=16).digest()
+        self.poses[sample] = self._distinct.setdefault(key, positions)
+
+    def changes(self, samples: np.ndarray) -> list[int]:
+        """Numbers of the samples at which the mesh is not as before or after, in order of time."""
+        order = sorted(self.poses, key=lambda n: samples[n])
+        inner = zip(order, order[1:], order[2:], strict=False)
+        return [order[0], *(n for a, n, b in inner if not self.poses[a] is self.poses[n] is self.poses[b]), order[-1]]
 
 
 class GeometryStore:
@@ -81,7 +93,7 @@ class GeometryStore:
             if number < 0:
                 number = self._new(ob, topology)
                 self._by_source.setdefault(source, []).append(number)
-            self.shapes[number].poses[sample] = _positions(ob.data)
+            self.shapes[number].take_pose(sample, _positions(ob.data))
             self._name_what_changes(ob, number)
         self._this_sample[pointer] = number
         return number
@@ -124,7 +136,7 @@ class GeometryStore:
 
     def _key_poses(self, ob: bpy.types.Object, shape: Shape, samples: np.ndarray) -> None:
         """Shape keys of the key poses, and the weights that bring each sample back."""
-        order = sorted(shape.poses, key=lambda n: samples[n])
+        order = shape.changes(samples)
         poses = np.stack([shape.poses[n] for n in order])
         times = samples[order]
         chosen = choose_targets(poses, times, np.sort(samples))
@@ -169,8 +181,14 @@ def _slots_of_object(ob: bpy.types.Object) -> bool:
 
 
 def _positions(mesh: bpy.types.Mesh) -> np.ndarray:
-    values = np.empty(len(mesh.vertices) * 3, dtype=np.float32)
-    mesh.vertices.foreach_get("co", values)
+    return _values(mesh, "position", "vector", len(mesh.vertices) * 3, np.float32)
+
+
+def _values(mesh: bpy.types.Mesh, attribute: str, key: str, number: int, kind: type) -> np.ndarray:
+    """Values of an attribute that Blender itself keeps: twenty times as fast as by way of vertices and loops."""
+    values = np.empty(number, dtype=kind)
+    if number:
+        mesh.attributes[attribute].data.foreach_get(key, values)
     return values
 
 
@@ -191,8 +209,7 @@ def _attributes(mesh: bpy.types.Mesh) -> bytes:
 
 def _topology(mesh: bpy.types.Mesh) -> bytes:
     """A digest of which vertices make which faces."""
-    corners = np.empty(len(mesh.loops), dtype=np.int32)
-    mesh.loops.foreach_get("vertex_index", corners)
+    corners = _values(mesh, ".corner_vert", "value", len(mesh.loops), np.int32)
     starts = np.empty(len(mesh.polygons), dtype=np.int32)
     mesh.polygons.foreach_get("loop_start", starts)
     digest = hashlib.blake2b(corners.tobytes() + starts.tobytes(), digest_size=16)

@@ -101,6 +101,39 @@ def test_shape_keys(blender, export):
         assert gltf.posed_points(node, frame)[:, 1].max() == pytest.approx(1 + shift, abs=1e-4)
 
 
+def test_equal_poses_are_held_once(blender):
+    """A mesh whose modifier changes nothing, and one that rests, moves, and rests where it began."""
+    import blender_scene as b
+    from exporters.blender.sample import Sampler
+    from exporters.common.report import Lost
+
+    scene = blender.context.scene
+    scene.frame_end = 12
+    b.cube("Still").modifiers.new("Bevel", "BEVEL")
+    moves = b.cube("Moves").modifiers.new("Wave", "DISPLACE")
+    b.key(moves, "strength", {4: 0.0, 6: 1.0, 8: 0.0})
+    sampler = Sampler(scene, blender.context.view_layer, (64, 36), Lost())
+    sampler.run(1, 12)
+    poses = {shape.name: list(shape.poses.values()) for shape in sampler.geometry.shapes}
+    assert {name: len(held) for name, held in poses.items()} == {"Still": 12, "Moves": 12}
+    assert {name: len(set(map(id, held))) for name, held in poses.items()} == {"Still": 1, "Moves": 3}
+
+
+def test_a_mesh_that_rests_begins_to_move_when_it_does(blender, export):
+    import blender_scene as b
+
+    blender.context.scene.frame_end = 12
+    b.camera()
+    ob = b.cube("Moves")
+    b.key(ob.modifiers.new("Wave", "DISPLACE"), "strength", {4: 0.0, 6: 1.0, 8: 0.0, 10: 0.5})
+    gltf = export()
+    node = gltf.node("Moves")
+    for frame in range(1, 13):
+        depsgraph = b.set_frame(frame)
+        want = np.array([v.co.z for v in ob.evaluated_get(depsgraph).data.vertices]).max()
+        assert gltf.posed_points(node, frame)[:, 1].max() == pytest.approx(want, abs=1e-4), frame
+
+
 def test_armature(blender, export):
     """A bent bone: deformation is carried pose by pose."""
     import blender_scene as b
