@@ -11,8 +11,8 @@ from .nodes import trees
 
 # What some system has no file names with.
 _FORBIDDEN = re.compile(r'[<>:"/\\|?*\x00-\x1f]')
-# Two names and a suffix fit into a file name, whatever letters they are written in.
-_LONGEST = 30
+# Bytes: of images that go into one texture, the exporter joins the names.
+_LONGEST = 100
 
 
 def name_as_files(materials: list[bpy.types.Material]) -> dict[str, str]:
@@ -25,7 +25,7 @@ def name_as_files(materials: list[bpy.types.Material]) -> dict[str, str]:
                 users.setdefault(node.image, []).append(node)
     for image, nodes in users.items():
         called = image.name
-        name = _FORBIDDEN.sub("_", called).lstrip(". ")[:_LONGEST] or "image"
+        name = _FORBIDDEN.sub("_", called).lstrip(". ").encode()[:_LONGEST].decode(errors="ignore") or "image"
         if name != called:
             if image.library:
                 # Its name belongs to another file.

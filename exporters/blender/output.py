@@ -34,6 +34,7 @@ class Output:
         if path.suffix not in (".gltf", ".glb"):
             raise OutputError(f"{path}: the name must end in .gltf or .glb")
         self._earlier = _files_of(path)
+        self._new_folders = [folder for folder in path.parents if not os.path.lexists(folder)]
         try:
             if path.is_dir():
                 raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR))
@@ -60,6 +61,8 @@ class Output:
         try:
             for source, target in moves:
                 target.parent.mkdir(exist_ok=True)
+                if target != self.path and os.path.lexists(target):
+                    raise FileExistsError(errno.EEXIST, f"{target.name} has come there meanwhile")
                 os.replace(source, target)
                 done.append((source, target))
         except OSError:
@@ -72,12 +75,15 @@ class Output:
                     folder.rmdir()
 
     def discard(self) -> None:
-        """Remove what is not in place."""
+        """Remove what is not in place, and folders that were made for nothing."""
         shutil.rmtree(self.folder, ignore_errors=True)
+        for folder in self._new_folders:
+            with contextlib.suppress(OSError):
+                folder.rmdir()
 
     def error(self, error: OSError) -> OutputError:
         """The line for a file that could not be written."""
-        return OutputError(f"{self.path}: cannot be written ({error.strerror}); choose another name or folder")
+        return OutputError(f"{self.path}: cannot be written ({error.strerror or error}); choose another name or folder")
 
     def _is_free(self, stem: str) -> bool:
         """Whether the files of an export by this name would replace none but those of the earlier one."""

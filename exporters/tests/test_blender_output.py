@@ -102,7 +102,23 @@ def test_what_cannot_be_put_in_place_changes_nothing(blender, scene, export, tmp
     with pytest.raises(OutputError, match=r"out/anim\.gltf: cannot be written \(Permission denied\)"):
         export("out/anim.gltf")
     assert files(tmp_path / "out") == before
-    assert again or not list((tmp_path / "out").iterdir())
+    assert again or not (tmp_path / "out").exists()
+
+
+def test_what_comes_into_the_way_meanwhile_stays(blender, scene, export, tmp_path, monkeypatch):
+    from exporters.blender import world
+
+    out = tmp_path / "out"
+    made = world.export_world
+
+    def export_world(*arguments):
+        (out / "anim_world.hdr").write_bytes(b"saved by the artist")
+        return made(*arguments)
+
+    monkeypatch.setattr(world, "export_world", export_world)
+    with pytest.raises(OutputError, match=r"anim_world\.hdr has come there meanwhile"):
+        export("out/anim.gltf")
+    assert files(out) == {"anim_world.hdr": b"saved by the artist"}
 
 
 @pytest.mark.parametrize("what", ["mesh", "texture", "image sky", "sky"])
@@ -128,7 +144,7 @@ def test_a_full_disk_is_one_line(blender, export, tmp_path, monkeypatch, what):
             export("out/anim.gltf", bake=256)
     finally:
         resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
-    assert list((tmp_path / "out").iterdir()) == []
+    assert not (tmp_path / "out").exists()
 
 
 def paint(blender, tree, socket, image=False):
