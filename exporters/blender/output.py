@@ -65,7 +65,7 @@ class Output:
                     raise FileExistsError(errno.EEXIST, f"{target.name} has come there meanwhile")
                 os.replace(source, target)
                 done.append((source, target))
-        except OSError:
+        except BaseException:
             for source, target in reversed(done):
                 os.replace(target, source)
             raise
