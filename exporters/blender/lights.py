@@ -18,6 +18,7 @@ from ..common.extras import LUMENS_PER_WATT, tidy
 from ..common.motion import Animation
 from ..common.report import Lost
 from .cameras import view_matrix
+from .nodes import source
 
 _HALF_PI = math.pi / 2
 
@@ -139,9 +140,15 @@ def _values(data: bpy.types.Light, scale: np.ndarray) -> dict[str, float]:
 
 
 def _emission(data: bpy.types.Light) -> tuple[np.ndarray, float]:
-    """Colour and strength of a light's Emission node, if it has a plain one."""
+    """Colour and strength of a light's Emission node, if it has a plain one; none where its nodes shine not."""
     tree = data.node_tree if data.use_nodes else None
-    node = next((n for n in tree.nodes if n.type == "EMISSION"), None) if tree else None
+    if tree is None:
+        return np.ones(3), 1.0
+    output = tree.get_output_node("ALL") or tree.get_output_node("CYCLES")
+    shown = source(output.inputs["Surface"]) if output is not None else None
+    if shown is None:
+        return np.ones(3), 0.0
+    node = shown.node if shown.node.type == "EMISSION" else next((n for n in tree.nodes if n.type == "EMISSION"), None)
     if node is None:
         return np.ones(3), 1.0
     colour, strength = node.inputs["Color"], node.inputs["Strength"]

@@ -21,8 +21,9 @@ def prepare(scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer) -> None:
     scene.world = getattr(view_layer, "world_override", None) or scene.world
     if not view_layer.use_sky:
         scene.world = None
-    if scene.world is not None and scene.world.node_tree is not None:
-        drop_muted(scene.world.node_tree)
+    for owner in (scene.world, *bpy.data.lights):
+        if owner is not None and owner.node_tree is not None:
+            drop_muted(owner.node_tree)
     if scene.render.use_simplify:
         scene.render.simplify_subdivision = scene.render.simplify_subdivision_render
         scene.render.simplify_child_particles = scene.render.simplify_child_particles_render

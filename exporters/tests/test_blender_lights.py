@@ -147,3 +147,24 @@ def test_lights_that_gltf_has_not_are_named(blender, export):
     gltf = export()
     assert {"negative light", "spot with different scales"} <= set(gltf.lost_features("Light"))
     assert gltf.lost_features("Linked") == ["light linking"]
+
+
+@pytest.mark.parametrize("muted", ["node", "link", "other"])
+def test_only_the_emission_that_is_shown_shines(blender, export, muted):
+    import blender_scene as b
+
+    b.camera()
+    data = b.light("SUN", energy=1.0).data
+    data.use_nodes = True
+    tree = data.node_tree
+    emission = next(node for node in tree.nodes if node.type == "EMISSION")
+    if muted == "node":
+        emission.mute = True
+    elif muted == "link":
+        emission.outputs[0].links[0].is_muted = True
+    else:
+        second = tree.nodes.new("ShaderNodeEmission")
+        second.inputs["Strength"].default_value = 3
+        tree.links.new(second.outputs[0], emission.outputs[0].links[0].to_socket)
+    light = export().root["extensions"]["KHR_lights_punctual"]["lights"][0]
+    assert light["intensity"] == pytest.approx(683 * 3 if muted == "other" else 0)
