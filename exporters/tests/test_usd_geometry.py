@@ -12,7 +12,7 @@ import usd_scene as u
 from exporters.usd.subdivide import Polygons, catmull_clark
 from gltf_reader import primitive
 from PIL import Image
-from pxr import Gf, Usd, UsdGeom, UsdSkel, Vt
+from pxr import Gf, Usd, UsdGeom, Vt
 
 
 def named(gltf, name):
@@ -256,30 +256,6 @@ def test_gprims_are_analytic_with_a_mesh(usd_convert, kind, attributes, shape):
     normal = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
     outward = triangles.mean(axis=1) if kind != "Plane" else np.tile(m[:3, 1], (len(triangles), 1))
     assert ((normal * outward).sum(axis=1) > -1e-9).all()
-
-
-def test_skinned_meshes_are_baked(usd_convert):
-    made = u.stage(frames=(1, 3))
-    u.camera(made)
-    UsdSkel.Root.Define(made, "/World/Model")
-    skeleton = UsdSkel.Skeleton.Define(made, "/World/Model/Skel")
-    skeleton.CreateJointsAttr(["Joint"])
-    skeleton.CreateBindTransformsAttr([Gf.Matrix4d(1)])
-    skeleton.CreateRestTransformsAttr([Gf.Matrix4d(1)])
-    animation = UsdSkel.Animation.Define(made, "/World/Model/Skel/Anim")
-    animation.CreateJointsAttr(["Joint"])
-    animation.CreateRotationsAttr([Gf.Quatf(1)])
-    animation.CreateScalesAttr([Gf.Vec3h(1)])
-    for frame in (1, 3):
-        animation.CreateTranslationsAttr().Set([Gf.Vec3f(0, 0, frame - 1)], frame)
-    mesh = u.quad(made, "/World/Model/Card")
-    binding = UsdSkel.BindingAPI.Apply(mesh.GetPrim())
-    binding.CreateSkeletonRel().SetTargets(["/World/Model/Skel"])
-    UsdSkel.BindingAPI.Apply(skeleton.GetPrim()).CreateAnimationSourceRel().SetTargets(["/World/Model/Skel/Anim"])
-    binding.CreateJointIndicesPrimvar(False, 1).Set([0] * 4)
-    binding.CreateJointWeightsPrimvar(False, 1).Set([1.0] * 4)
-    gltf = usd_convert(made)
-    assert gltf.posed_points(gltf.node("Card"), 3)[:, 2] == pytest.approx([2] * 4)
 
 
 def test_broken_transforms_are_hidden_and_named(usd_convert):

@@ -12,7 +12,7 @@ from urllib.parse import quote
 
 import numpy as np
 import pygltflib
-from pxr import Tf, Usd, UsdGeom, UsdRender, UsdSkel
+from pxr import Tf, Usd, UsdGeom, UsdRender
 
 from ..common import extras, motion
 from ..common.document import Document, write_whole
@@ -21,6 +21,7 @@ from .cameras import CameraTrack
 from .lights import DomeTrack, LightTrack, write_dome
 from .materials import Materials
 from .shapes import Geometries
+from .skins import bake_skins
 from .stage import open_stage, reason
 from .textures import Textures
 from .walk import Found, Walker
@@ -98,7 +99,7 @@ class _Conversion:
         self.fps = extras.rational(self.stage.GetFramesPerSecond()) if rated else codes
         self.codes_per_frame = codes[0] * self.fps[1] / (codes[1] * self.fps[0])
         self._settings()
-        self._bake_skins()
+        bake_skins(self.stage, self.lost, options.progress)
         self.walker = Walker(self.stage, self.lost)
         self.frames = options.frames or self._range()
         if self.frames[1] < self.frames[0]:
@@ -134,21 +135,6 @@ class _Conversion:
                 self.lost.add(str(prim.GetPath()), "dataWindowNDC", "the whole picture is rendered; pass --crop to buzz-convert")
         if self.policy == "adjustPixelAspectRatio":
             self.lost.add("RenderSettings", "adjustPixelAspectRatio", "the pixel aspect of the first camera frame is used for the whole shot")
-
-    def _bake_skins(self) -> None:
-        """Let UsdSkel deform skinned meshes into time samples of the session layer."""
-        roots = [p for p in self.stage.Traverse() if p.IsA(UsdSkel.Root)]
-        if not roots:
-            return
-        self.options.progress(f"baking {len(roots)} skinned models")
-        if any(p.IsInstance() for p in self.stage.Traverse()):
-            # Baking writes points, which instances of one prototype cannot have of their own.
-            for prim in list(self.stage.Traverse()):
-                if prim.IsInstance() and any(below.IsA(UsdSkel.Root) for below in Usd.PrimRange(prim, Usd.TraverseInstanceProxies())):
-                    prim.SetInstanceable(False)
-        for root in [p for p in self.stage.Traverse() if p.IsA(UsdSkel.Root)]:
-            if not UsdSkel.BakeSkinning(Usd.PrimRange(root)):
-                self.lost.add(str(root.GetPath()), "skinning", "UsdSkel could not bake it; it stands in its rest pose")
 
     def _range(self) -> tuple[int, int]:
         times = [self.stage.GetStartTimeCode(), self.stage.GetEndTimeCode()]
