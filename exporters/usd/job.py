@@ -2,24 +2,22 @@
 
 from __future__ import annotations
 
-import json
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
-from urllib.parse import quote
 
 import numpy as np
-import pygltflib
 from pxr import Tf, Usd, UsdGeom, UsdRender
 
 from ..common import extras, motion
-from ..common.document import Document, write_whole
+from ..common.document import Document
 from ..common.report import InputError, Lost, OutputError
 from .cameras import CameraTrack
 from .lights import DomeTrack, LightTrack, write_dome
 from .materials import Materials
+from .output import Output
 from .shapes import Geometries
 from .skins import bake_skins
 from .stage import open_stage, reason
@@ -71,19 +69,16 @@ def convert(source: Path, target: Path, options: Options) -> Result:
     if target.suffix not in (".gltf", ".glb"):
         raise OutputError(f"{target}: the name must end in .gltf or .glb")
     try:
-        target.parent.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise OutputError(f"{target.parent}: cannot be written ({error.strerror}); choose another output folder") from error
-    try:
-        return _Conversion(source, target, options).run()
+        with Output(target) as output:
+            return _Conversion(source, output, options).run()
     except Tf.ErrorException as error:
         # What USD itself refuses, such as an xformOp that does not exist.
         raise InputError(f"{source}: {reason(error)}; check the stage with usdchecker") from None
 
 
 class _Conversion:
-    def __init__(self, source: Path, target: Path, options: Options) -> None:
-        self.source, self.target, self.options = Path(source), target, options
+    def __init__(self, source: Path, output: Output, options: Options) -> None:
+        self.source, self.output, self.options = Path(source), output, options
         self.lost = Lost()
         self.stage = open_stage(self.source, options.variants, self.lost)
         self.up = UsdGeom.GetStageUpAxis(self.stage)
@@ -168,7 +163,7 @@ class _Conversion:
         self.options.progress(f"writing {len(self.geometry.items)} meshes")
         document = Document()
         animation = motion.Animation(document, [(f - first) * self.fps[1] / self.fps[0] for f in frames])
-        materials = Materials(document, Textures(document, self.target, self.lost), self.lost, self._time(first))
+        materials = Materials(document, Textures(document, self.output, self.lost), self.lost, self._time(first))
         self.geometry.write(document, materials, np.array(self.taken))
         for track in self.tracks.values():
             self._write_track(document, animation, track)
@@ -186,13 +181,13 @@ class _Conversion:
                 continue
             if len(dome.states) > 1:
                 self.lost.add(path, "dome light that changes", "it stays as it is where it is first seen; animate other lights instead")
-            world = write_dome(dome.prim, *dome.seen, self.up, self.target, self.lost)
+            world = write_dome(dome.prim, *dome.seen, self.up, self.output, self.lost)
         cuts = self._cuts()
         if world is None and not self.lights and self.options.camera_light:
             self._camera_light(document, animation, cuts)
         animation.close()
         self._finish(document, world, cuts)
-        return Result(self.target, self.lost, document.root)
+        return Result(self.output.target, self.lost, document.root)
 
     def _animated(self) -> bool:
         """Whether any attribute of the stage has more than one time sample (or clips)."""
@@ -340,7 +335,7 @@ class _Conversion:
         document.root["asset"] = {"version": "2.0", "generator": buzz["generator"]}
         document.root["scenes"], document.root["scene"] = [scene], 0
         extras.check(document.root)
-        save(document, self.target)
+        self.output.finish(document)
 
     def _shutter(self, track: CameraTrack | None) -> float | None:
         if track is None:
@@ -359,19 +354,3 @@ def stands_still(poses: np.ndarray) -> bool:
     # Far less than that is the rounding of double precision, no movement.
     rounding = np.spacing(far.astype(np.float32))
     return bool(((far > _FAR) & (steps < rounding) & (steps > rounding * 1e-6)).any())
-
-
-def save(document: Document, target: Path) -> None:
-    """Write through pygltflib."""
-    root = {k: v for k, v in document.root.items() if v not in ([], {})}
-    if document.binary:
-        root["buffers"] = [{"byteLength": len(document.binary)}]
-        if target.suffix == ".gltf":
-            root["buffers"][0]["uri"] = quote(f"{target.stem}.bin")
-            write_whole(target.with_suffix(".bin"), bytes(document.binary))
-    gltf = pygltflib.GLTF2.from_json(json.dumps(root))
-    if target.suffix == ".gltf":
-        write_whole(target, gltf.gltf_to_json(separators=(",", ":"), indent=None).encode())
-        return
-    gltf.set_binary_blob(bytes(document.binary))
-    write_whole(target, b"".join(gltf.save_to_bytes()))

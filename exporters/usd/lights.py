@@ -15,10 +15,11 @@ from urllib.parse import quote
 import numpy as np
 from pxr import Usd, UsdGeom, UsdLux
 
-from ..common.document import Document, write_whole
+from ..common.document import Document
 from ..common.extras import LUMENS_PER_WATT, tidy
 from ..common.motion import Animation, unscaled
 from ..common.report import Lost
+from .output import Output
 from .textures import open_asset, resolved_path
 
 _PUNCTUAL = ("SphereLight", "RectLight", "DiskLight", "CylinderLight", "DistantLight")
@@ -216,7 +217,7 @@ class DomeTrack:
         self.states.add((state + 0.0).tobytes())
 
 
-def write_dome(prim: Usd.Prim, time: Usd.TimeCode, world: np.ndarray, up: str, target: Path, lost: Lost) -> dict[str, Any]:
+def write_dome(prim: Usd.Prim, time: Usd.TimeCode, world: np.ndarray, up: str, output: Output, lost: Lost) -> dict[str, Any]:
     """A dome light as `extras.buzz.world`. `world` is its matrix in glTF's space, scale aside."""
     path = str(prim.GetPath())
     _warn_of_links(prim, lost)
@@ -239,8 +240,7 @@ def write_dome(prim: Usd.Prim, time: Usd.TimeCode, world: np.ndarray, up: str, t
     if layout not in ("automatic", "latlong"):
         lost.add(path, f"{layout} dome texture", "convert it to latlong; the dome is a plain colour")
         return out
-    file = f"{target.stem}_world{suffix}"
-    write_whole(target.parent / file, data)
+    file = output.add(f"{output.target.stem}_world", suffix, data)
     turn = unscaled(world)[:3, :3]
     if prim.GetTypeName() == "DomeLight_1":
         pole = str(_get(prim, "poleAxis", time, "scene"))

@@ -17,9 +17,10 @@ import numpy as np
 from PIL import Image, UnidentifiedImageError
 from pxr import Ar, Sdf
 
-from ..common.document import Document, write_whole
+from ..common.document import Document
 from ..common.report import Lost
 from ..common.srgb import decoded, encoded
+from .output import Output
 
 _EXR_MAGIC = b"\x76\x2f\x31\x01"
 _DIRECT = {"PNG": ".png", "JPEG": ".jpg"}
@@ -50,8 +51,8 @@ def open_asset(resolved: str) -> bytes | None:
 class Textures:
     """Images of one export; each distinct content is written once. A `colour` is sRGB-coded in glTF, anything else is not."""
 
-    def __init__(self, document: Document, target: Path, lost: Lost) -> None:
-        self.document, self.target, self.lost = document, target, lost
+    def __init__(self, document: Document, output: Output, lost: Lost) -> None:
+        self.document, self.output, self.lost = document, output, lost
         self._images: dict[bytes, int] = {}
         self._textures: dict[tuple, int] = {}
         self._raw: dict[str, bytes | None] = {}
@@ -171,14 +172,12 @@ class Textures:
     def _image(self, data: bytes, suffix: str, name: str) -> int:
         base = Path(Ar.SplitPackageRelativePathInner(name)[1] or name if "[" in name else name).stem or "texture"
         base = "".join(c if c.isalnum() or c in "-_" else "_" for c in base)
-        if self.target.suffix == ".glb":
+        if self.output.target.suffix == ".glb":
             mime = "image/png" if suffix == ".png" else "image/jpeg"
             return self.document.append("images", {"name": base, "mimeType": mime, "bufferView": self.document.add_view(data)})
-        folder = f"{self.target.stem}_textures"
         number = len(self.document.list("images"))
-        file = f"{base}_{number}{suffix}"
-        write_whole(self.target.parent / folder / file, data)
-        return self.document.append("images", {"name": base, "uri": quote(f"{folder}/{file}")})
+        file = self.output.add(f"{self.output.target.stem}_textures/{base}_{number}", suffix, data)
+        return self.document.append("images", {"name": base, "uri": quote(file)})
 
 
 def _format(data: bytes | None) -> str | None:
