@@ -106,6 +106,18 @@ def test_range_from_samples(usd_convert):
 
 
 @pytest.mark.parametrize(
+    ("codes", "rate", "span", "frames"),
+    [(24.0, 23.976, (1, 12), (1, 12)), (24.0, 24.0, (0.75, 4.25), (1, 5)), (1000.0, 24.0, (10, 1000), (1, 24)), (24.0, 24.0, (-2.5, 0), (-2, 0))],
+)
+def test_no_frame_is_before_the_start(usd_convert, codes, rate, span, frames):
+    made = u.stage(frames=span, rate=codes)
+    made.SetFramesPerSecond(rate)
+    u.camera(made)
+    gltf = usd_convert(made)
+    assert (gltf.buzz["frame_start"], gltf.buzz["frame_end"]) == frames
+
+
+@pytest.mark.parametrize(
     ("policy", "p00", "p11"),
     [("expandAperture", 2.0, 2.0), ("cropAperture", 4.0, 4.0), ("adjustApertureWidth", 4.0, 4.0), ("adjustApertureHeight", 2.0, 2.0)],
 )
@@ -138,6 +150,18 @@ def test_products_override_settings(usd_convert):
     settings.CreateProductsRel().SetTargets(["/Render/Product"])
     gltf = usd_convert(made)
     assert (gltf.buzz["resolution"], gltf.buzz["pixel_aspect"]) == ([64, 36], 2)
+
+
+@pytest.mark.parametrize(("name", "value"), [("resolution", Gf.Vec2i(0, 100)), ("pixelAspectRatio", 0.0)])
+def test_settings_without_pixels_are_one_clear_error(usd_convert, name, value):
+    from exporters.common.report import InputError
+
+    made = u.stage()
+    u.camera(made)
+    settings = UsdRender.Settings.Define(made, "/Render/Settings")
+    settings.GetPrim().GetAttribute(name).Set(value)
+    with pytest.raises(InputError, match=f"/Render/Settings: .*{name}"):
+        usd_convert(made)
 
 
 def test_chosen_camera(usd_convert):

@@ -196,6 +196,9 @@ def test_plain_dome_and_second_dome(usd_convert):
         ("#usda 1.0\n", ["--variant", "a"], 2, "SET=VALUE"),
         ("#usda 1.0\n", ["--camera", "/Nobody"], 3, "the stage has none"),
         ("#usda 1.0\n", ["--frames", "5-1"], 3, "before the first"),
+        ("#usda 1.0\n", ["--resolution", "0x0"], 2, "has no pixels"),
+        ("#usda 1.0\n", ["--resolution", "64x0"], 2, "has no pixels"),
+        ("#usda 1.0\n", ["--resolution", "10x-5"], 2, "has no pixels"),
     ],
 )
 def test_command_line(tmp_path, content, arguments, code, words):

@@ -120,9 +120,13 @@ class _Conversion:
             size = base.GetResolutionAttr()
             if self.options.resolution is None and (size.HasAuthoredValue() or self.resolution is None):
                 self.resolution = tuple(size.Get())
+            if self.resolution is not None and min(self.resolution) < 1:
+                raise InputError(f"{prim.GetPath()}: its resolution is {'x'.join(map(str, self.resolution))}; pass --resolution WIDTHxHEIGHT")
             for attribute, name in ((base.GetPixelAspectRatioAttr(), "pixel_aspect"), (base.GetAspectRatioConformPolicyAttr(), "policy")):
                 if attribute.HasAuthoredValue():
                     setattr(self, name, attribute.Get())
+            if not 0 < self.pixel_aspect < math.inf:
+                raise InputError(f"{prim.GetPath()}: pixelAspectRatio is {self.pixel_aspect}; it must be a number over 0")
             if self.options.camera is None and base.GetCameraRel().GetTargets():
                 self.camera = str(base.GetCameraRel().GetTargets()[0])
             window = base.GetDataWindowNDCAttr()
@@ -138,7 +142,8 @@ class _Conversion:
         if not all(math.isfinite(t) for t in times):
             raise InputError(f"{self.source}: its time codes are no numbers; pass --frames FIRST-LAST")
         frames = [round(t / self.codes_per_frame, 6) for t in times]
-        return (math.floor(min(frames)), math.ceil(max(frames))) if frames else (0, 0)
+        # Before the first code there is nothing to show; what comes last is shown.
+        return (math.ceil(min(frames)), math.ceil(max(frames))) if frames else (0, 0)
 
     def run(self) -> Result:
         """Do the whole job."""

@@ -48,6 +48,13 @@ def _pair(separator: str):
     return pair
 
 
+def _resolution(text: str) -> tuple[int, int]:
+    size = _pair("x")(text)
+    if min(size) < 1:
+        raise argparse.ArgumentTypeError(f"{text!r} has no pixels: width and height must be 1 or more")
+    return size
+
+
 def main(argv: list[str]) -> int:
     """Parse and convert; the exit code."""
     parser = argparse.ArgumentParser(prog="usd_to_gltf.py", description="Convert a USD stage to glTF with nothing lost.")
@@ -56,7 +63,7 @@ def main(argv: list[str]) -> int:
     parser.add_argument("--camera", help="prim path or name of the camera (render settings', else the first animated one)")
     parser.add_argument("--variant", type=_variant, action="append", default=[], metavar="[/prim:]SET=VALUE", help="choose a variant; repeatable")
     parser.add_argument("--frames", type=_pair("-"), help="FIRST-LAST frames (the stage's)")
-    parser.add_argument("--resolution", type=_pair("x"), help="WIDTHxHEIGHT (the render settings')")
+    parser.add_argument("--resolution", type=_resolution, help="WIDTHxHEIGHT (the render settings')")
     parser.add_argument("--subdivision", type=int, default=2, help="levels for subdivision meshes, 0: the cage (2)")
     parser.add_argument("--no-camera-light", action="store_true", help="leave a stage without lights dark")
     arguments = parser.parse_args(argv)
