@@ -176,6 +176,25 @@ def test_chosen_camera(usd_convert):
         usd_convert(made, camera="/World/C")
 
 
+@pytest.mark.parametrize("name", ["horizontalAperture", "verticalAperture", "focalLength"])
+def test_a_camera_that_takes_no_picture(usd_convert, name):
+    """It is named; only where it is the one to look through, the export stops. One that is bad at one frame only is bad."""
+    from exporters.common.report import InputError
+
+    made = u.stage()
+    bad = u.camera(made, "/World/Bad").GetPrim().GetAttribute(name)
+    bad.Set(20.0, 1)
+    bad.Set(0.0, 5)
+    with pytest.raises(InputError, match=f"camera /World/Bad: {name} is 0"):
+        usd_convert(made)
+    u.camera(made, "/World/Good")
+    gltf = usd_convert(made)
+    assert gltf.lost_features("/World/Bad") == [f"camera whose {name} is 0"]
+    assert (gltf.buzz["cuts"][0]["camera"], len(gltf.root["cameras"])) == ("/World/Good", 1)
+    with pytest.raises(InputError, match=f"camera /World/Bad: {name} is 0"):
+        usd_convert(made, camera="Bad")
+
+
 def test_shutter_and_depth_of_field(usd_convert):
     made = u.stage()
     u.camera(made, fStop=2.8, focusDistance=5.0)

@@ -15,6 +15,16 @@ from ..common.motion import Animation, unscaled
 from ..common.report import Lost
 
 
+def flaw(prim: Usd.Prim, time: Usd.TimeCode) -> str | None:
+    """Why no picture can be taken with a camera at a time; None where one can."""
+    camera = UsdGeom.Camera(prim).GetCamera(time)
+    sizes = {"horizontalAperture": camera.horizontalAperture, "verticalAperture": camera.verticalAperture}
+    if camera.projection == Gf.Camera.Perspective:
+        sizes["focalLength"] = camera.focalLength
+    wrong = [f"{name} is {value:g}" for name, value in sizes.items() if not 0 < value < math.inf]
+    return wrong[0] if wrong else None
+
+
 @dataclass
 class CameraTrack:
     """One camera, sampled."""

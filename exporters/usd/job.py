@@ -14,7 +14,7 @@ from pxr import Tf, Usd, UsdGeom, UsdRender
 from ..common import extras, motion
 from ..common.document import Document
 from ..common.report import InputError, Lost, OutputError
-from .cameras import CameraTrack
+from .cameras import CameraTrack, flaw
 from .lights import DomeTrack, LightTrack, write_dome
 from .materials import Materials
 from .output import Output
@@ -103,6 +103,8 @@ class _Conversion:
             raise InputError(f"frame range {self.frames[0]}-{self.frames[1]}: longer than {_LONGEST} frames; pass --frames FIRST-LAST")
         self.tracks: dict[tuple, Track] = {}
         self.cameras: dict[tuple, CameraTrack] = {}
+        # Cameras that cannot be used, with the reason.
+        self.flaws: dict[str, str] = {}
         self.lights: dict[tuple, LightTrack] = {}
         self.domes: dict[tuple, DomeTrack] = {}
         self.geometry = Geometries(options.levels, self.lost)
@@ -223,6 +225,11 @@ class _Conversion:
                 self.lost.add(str(found.prim.GetPath()), "transform that is no usable number", "it is hidden while that lasts; check its xformOps")
                 found.visible, world = False, self.root
             if found.kind == "camera":
+                path, wrong = str(found.prim.GetPath()), flaw(found.prim, time)
+                if wrong or path in self.flaws:
+                    self.flaws.setdefault(path, wrong)
+                    self.cameras.pop(found.key, None)
+                    continue
                 track = self.cameras.setdefault(found.key, CameraTrack(found.prim))
                 track.sample(time, world, self.units, aspect, self.policy)
             elif found.kind == "dome":
@@ -281,16 +288,20 @@ class _Conversion:
     def _cuts(self) -> list[dict[str, Any]]:
         """The camera asked for, the render settings', the one bound in a viewer, or the first that moves."""
         tracks = {str(t.prim.GetPath()): t for t in self.cameras.values()}
-        wanted = self.camera
-        if wanted is not None and wanted not in tracks:
-            near = [p for p in tracks if p.endswith("/" + wanted.lstrip("/"))]
+        known, wanted = [*tracks, *self.flaws], self.camera
+        if wanted is not None and wanted not in known:
+            near = [p for p in known if p.endswith("/" + wanted.lstrip("/"))]
             if len(near) != 1:
-                raise InputError(f"camera {wanted}: the stage has {', '.join(tracks) or 'none'}")
+                raise InputError(f"camera {wanted}: the stage has {', '.join(known) or 'none'}")
             wanted = near[0]
         if wanted is None:
             bound = self.stage.GetRootLayer().customLayerData.get("cameraSettings", {}).get("boundCamera")
             moving = next((p for p, t in tracks.items() if motion.varies(np.array(t.poses))), None)
-            wanted = bound if bound in tracks else moving or next(iter(tracks), None)
+            wanted = bound if bound in tracks else moving or next(iter(known), None)
+        if wanted in self.flaws:
+            raise InputError(f"camera {wanted}: {self.flaws[wanted]}; it must be a number over 0")
+        for path, wrong in self.flaws.items():
+            self.lost.add(path, f"camera whose {wrong}", "it is left out; give it a number over 0")
         if wanted is None:
             self.lost.add(str(self.source.name), "no camera", "add a Camera to the stage, or convert with --turntable")
             return []
