@@ -88,6 +88,22 @@ def test_point_instancer(usd_convert):
     assert [gltf.visible(boxes[1], f) for f in (1, 2)] == [True, False]
 
 
+def test_point_instancer_whose_ids_are_alike(usd_convert):
+    made = u.stage(frames=(1, 2))
+    u.camera(made)
+    instancer = UsdGeom.PointInstancer.Define(made, "/World/Many")
+    u.cube(made, "/World/Many/Box")
+    instancer.CreatePrototypesRel().SetTargets(["/World/Many/Box"])
+    instancer.CreateProtoIndicesAttr([0, 0, 0])
+    instancer.CreateIdsAttr([0, 0, 0])
+    for frame in (1, 2):
+        instancer.CreatePositionsAttr().Set([(x, 0, frame) for x in (0, 5, 9)], frame)
+    gltf = usd_convert(made)
+    for frame in (1, 2):
+        places = [gltf.world(n, frame)[:3, 3] for n in named(gltf, "Box")]
+        np.testing.assert_allclose(places, [(x, 0, frame) for x in (0, 5, 9)], atol=1e-6)
+
+
 def test_native_instances_references_payloads_and_variants(usd_convert, tmp_path):
     asset = Usd.Stage.CreateNew(str(tmp_path / "asset.usda"))
     root = UsdGeom.Xform.Define(asset, "/Asset")

@@ -113,6 +113,8 @@ class Walker:
         if len(places) != len(which) or (ids is not None and (not hasattr(ids, "__len__") or len(ids) != len(which))):
             self.lost.add(path, "PointInstancer whose arrays differ in length", "it is left out; check it with usdchecker")
             return
+        if ids is None or len(set(ids)) < len(ids):
+            ids = range(len(which))
         for i, number in enumerate(which):
             if number >= len(roots) or number < 0:
                 self.lost.add(path, f"prototype {number} that does not exist", "its instances are left out")
@@ -125,7 +127,7 @@ class Walker:
                 self._below[root] = list(self._list(root))
             shown = visible and (not mask or bool(mask[i]))
             place = matrix @ column(places[i])
-            name = (*key, int(ids[i]) if ids is not None else i, int(number))
+            name = (*key, int(ids[i]), int(number))
             for kind, below in self._below[root]:
                 local = place if below == root else place @ column(cache.ComputeRelativeTransform(below, root)[0])
                 seen = shown and _shown_below(below, root, time)
