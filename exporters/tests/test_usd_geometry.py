@@ -258,6 +258,26 @@ def test_gprims_are_analytic_with_a_mesh(usd_convert, kind, attributes, shape):
     assert ((normal * outward).sum(axis=1) > -1e-9).all()
 
 
+@pytest.mark.parametrize("axis", ["X", "Y", "Z"])
+@pytest.mark.parametrize(("top", "bottom", "height"), [(0.3, 0.9, 3.0), (0.9, 0.3, 3.0), (0.2, 1.0, 0.5)])
+def test_capsules_of_two_radii(usd_convert, axis, top, bottom, height):
+    """Mesh and analytic shape fill the extent that USD itself computes."""
+    made = u.stage()
+    u.camera(made)
+    prim = UsdGeom.Capsule_1.Define(made, "/World/Shape")
+    for name, value in (("axis", axis), ("radiusTop", top), ("radiusBottom", bottom), ("height", height)):
+        prim.GetPrim().GetAttribute(name).Set(value)
+    gltf = usd_convert(made)
+    extent = np.array(UsdGeom.Boundable.ComputeExtentFromPlugins(prim, Usd.TimeCode(1)))
+    m = gltf.world(gltf.node("Shape"), 1)
+    points = gltf.triangles(gltf.node("Shape")).reshape(-1, 3) @ m[:3, :3].T + m[:3, 3]
+    np.testing.assert_allclose([points.min(axis=0), points.max(axis=0)], extent, atol=0.01 * np.ptp(extent))
+    shape = gltf.root["extensions"]["KHR_implicit_shapes"]["shapes"][0]["capsule"]
+    centres = [m @ (0, sign * shape["height"] / 2, 0, 1) for sign in (1, -1)]
+    balls = [(c[:3] - r, c[:3] + r) for c, r in zip(centres, (shape["radiusTop"], shape["radiusBottom"]), strict=True)]
+    np.testing.assert_allclose([np.min(balls, axis=(0, 1)), np.max(balls, axis=(0, 1))], extent, atol=1e-5)
+
+
 def test_broken_transforms_are_hidden_and_named(usd_convert):
     made = u.stage()
     camera = u.camera(made)

@@ -71,15 +71,26 @@ def read_gprim(prim: Usd.Prim, time: Usd.TimeCode) -> Shape | None:
     size = {"height": height, "radiusTop": top, "radiusBottom": bottom}
     half = height / 2
     if kind == "Capsule":
-        # Where the cone touches both spheres, its normal is tilted by asin((bottom - top) / height).
-        tilt = np.arcsin(np.clip((bottom - top) / max(height, 1e-12), -1, 1))
-        profile = np.concatenate([_arc(0, np.pi / 2 - tilt, top, half, top), _arc(np.pi / 2 - tilt, np.pi, bottom, -half, bottom)])
-        return Shape({"type": "capsule", "capsule": size}, axis, *_lathe(profile))
+        return _capsule(top, bottom, height, axis)
     slope = np.array([height, bottom - top]) / max(np.hypot(height, bottom - top), 1e-12)
     profile = np.array([
         [0, half, 0, 1], [top, half, 0, 1], [top, half, *slope], [bottom, -half, *slope], [bottom, -half, 0, -1], [0, -half, 0, -1],
     ])  # fmt: skip
     return Shape({"type": "cylinder", "cylinder": size}, axis, *_lathe(profile))
+
+
+def _capsule(top: float, bottom: float, height: float, axis: np.ndarray) -> Shape:
+    """USD's radii are those of the cone's ends, which the caps touch; KHR_implicit_shapes has the caps' own, and the distance of their centres."""
+    slope = (bottom - top) / height if height > 0 else 0.0
+    stretch = np.hypot(1, slope)
+    upper, lower = height / 2 - top * slope, -height / 2 - bottom * slope
+    placed = axis.copy()
+    placed[:3, 3] = axis[:3, 1] * (upper + lower) / 2
+    top, bottom, half = top * stretch, bottom * stretch, (upper - lower) / 2
+    tilt = np.arctan(slope)
+    profile = np.concatenate([_arc(0, np.pi / 2 - tilt, top, half, top), _arc(np.pi / 2 - tilt, np.pi, bottom, -half, bottom)])
+    size = {"height": float(2 * half), "radiusTop": float(top), "radiusBottom": float(bottom)}
+    return Shape({"type": "capsule", "capsule": size}, placed, *_lathe(profile))
 
 
 def _arc(start: float, end: float, radius: float, centre: float, scale: float) -> np.ndarray:
