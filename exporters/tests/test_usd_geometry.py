@@ -67,6 +67,27 @@ def test_left_handed_holes_and_ngons(usd_convert):
     assert right.GetPrim() != left.GetPrim()
 
 
+@pytest.mark.parametrize("orientation", ["rightHanded", "leftHanded"])
+def test_concave_faces(usd_convert, orientation):
+    """An L, a U and one that is a hole."""
+    made = u.stage()
+    u.camera(made)
+    prim = UsdGeom.Mesh.Define(made, "/World/Letters")
+    ell = [(0, 0), (3, 0), (3, 1), (1, 1), (1, 3), (0, 3)]
+    you = [(5, 0), (8, 0), (8, 3), (7, 3), (7, 1), (6, 1), (6, 3), (5, 3)]
+    prim.CreatePointsAttr([(x, y, 0) for x, y in ell + you])
+    prim.CreateFaceVertexCountsAttr([6, 6, 8])
+    prim.CreateFaceVertexIndicesAttr([5, 0, 1, 2, 3, 4, *range(6), *range(6, 14)])
+    prim.CreateHoleIndicesAttr([1])
+    prim.CreateSubdivisionSchemeAttr("none")
+    prim.CreateOrientationAttr(orientation)
+    triangles = usd_convert(made)
+    triangles = triangles.triangles(triangles.node("Letters"))
+    areas = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])[:, 2] / 2 * (1 if orientation == "rightHanded" else -1)
+    assert areas.min() > 0
+    assert areas.sum() == pytest.approx(5 + 7)
+
+
 def test_primvars_of_every_interpolation(usd_convert, tmp_path):
     Image.new("RGB", (2, 2), (255, 0, 0)).save(tmp_path / "t.png")
     made = u.stage()

@@ -9,6 +9,7 @@ from pxr import Usd, UsdGeom, UsdShade
 
 from ..common.report import Lost
 from .subdivide import INFINITE, Polygons, catmull_clark, smooth_normals
+from .triangulate import triangulate
 
 _MAX_FACES = 4_000_000
 _PURPOSES = (UsdShade.Tokens.full, UsdShade.Tokens.allPurpose)
@@ -30,10 +31,10 @@ class Primitive:
 def read_mesh(prim: Usd.Prim, time: Usd.TimeCode, levels: int, lost: Lost) -> list[Primitive]:
     """The primitives of a mesh at one time; none if it has no valid face."""
     mesh = UsdGeom.Mesh(prim)
-    polygons, has_normals = _polygons(mesh, time, levels, lost)
+    polygons, _ = _polygons(mesh, time, levels, lost)
     if polygons is None:
         return []
-    return [_primitive(polygons, chosen, source, has_normals) for source, chosen in _subsets(mesh, polygons, time, lost)]
+    return [_primitive(polygons, chosen, source) for source, chosen in _subsets(mesh, polygons, time, lost)]
 
 
 def add_pose(primitives: list[Primitive], prim: Usd.Prim, time: Usd.TimeCode, levels: int, lost: Lost) -> bool:
@@ -238,13 +239,10 @@ def _subsets(mesh: UsdGeom.Mesh, polygons: Polygons, time: Usd.TimeCode, lost: L
     return found
 
 
-def _primitive(mesh: Polygons, chosen: np.ndarray, source: Usd.Prim, has_normals: bool) -> Primitive:
-    """Triangulate faces as fans and join equal corners into vertices."""
-    starts = np.concatenate([[0], np.cumsum(mesh.counts)[:-1]])[chosen]
-    counts = mesh.counts[chosen]
-    fans = np.repeat(np.arange(len(counts)), counts - 2)
-    step = np.arange(len(fans)) - np.repeat(np.concatenate([[0], np.cumsum(counts - 2)[:-1]]), counts - 2)
-    triangles = np.stack([starts[fans], starts[fans] + step + 1, starts[fans] + step + 2], axis=1).reshape(-1)
+def _primitive(mesh: Polygons, chosen: np.ndarray, source: Usd.Prim) -> Primitive:
+    """Triangulate faces and join equal corners into vertices."""
+    within = np.flatnonzero(np.repeat(chosen, mesh.counts))
+    triangles = within[triangulate(mesh.points, mesh.corners[within], mesh.counts[chosen])].reshape(-1)
     columns = [mesh.corners[triangles, None].astype(float)]
     columns += [np.round(v[triangles], 7) for v in mesh.corner.values()]
     _, first, indices = np.unique(np.concatenate(columns, axis=1), axis=0, return_index=True, return_inverse=True)
