@@ -12,6 +12,8 @@ from .subdivide import INFINITE, Polygons, catmull_clark, smooth_normals
 from .triangulate import triangulate
 
 _MAX_FACES = 4_000_000
+# Primvars that colour a mesh: what their values are called in here, and how many numbers each has.
+DISPLAY = {"displayColor": ("colour", 3), "displayOpacity": ("opacity", 1)}
 _PURPOSES = (UsdShade.Tokens.full, UsdShade.Tokens.allPurpose)
 
 
@@ -95,7 +97,7 @@ def _polygons(mesh: UsdGeom.Mesh, time: Usd.TimeCode, levels: int, lost: Lost) -
     out = Polygons(points, counts, corners, np.arange(len(counts)))
     _creases(mesh, time, out)
     subdivide = levels if scheme == UsdGeom.Tokens.catmullClark else 0
-    _primvars(mesh, time, out, lost)
+    _primvars(mesh, time, out, subdivide > 0, lost)
     if subdivide:
         # Authored normals mean nothing on a subdivision surface (UsdGeomMesh: "normals are ignored").
         out.corner.pop("NORMAL", None)
@@ -105,6 +107,7 @@ def _polygons(mesh: UsdGeom.Mesh, time: Usd.TimeCode, levels: int, lost: Lost) -
             lost.add(path, f"subdivision beyond level {level}", "it would make more than four million faces; simplify the cage")
             break
         out = catmull_clark(out, corners_sharp=rule != UsdGeom.Tokens.edgeOnly)
+    out.corner |= {k: v[out.corners] for k, v in out.vertex.items()}
     holes = _array(mesh.GetHoleIndicesAttr(), time, int)
     good = ~np.isin(out.parents, holes) & (out.counts >= 3)
     if not good.all():
@@ -144,50 +147,58 @@ def _creases(mesh: UsdGeom.Mesh, time: Usd.TimeCode, out: Polygons) -> None:
     out.point_sharpness[corners[:n][valid]] = np.minimum(weights[:n][valid], INFINITE)
 
 
-def _primvars(mesh: UsdGeom.Mesh, time: Usd.TimeCode, out: Polygons, lost: Lost) -> None:
-    """Texture coordinates, colour and normals as values at corners (colours and st at points where they may be smoothed)."""
+def _primvars(mesh: UsdGeom.Mesh, time: Usd.TimeCode, out: Polygons, smooth: bool, lost: Lost) -> None:
+    """Texture coordinates, colour and normals as values at corners; those of points at points where they are to be smoothed."""
+    path = str(mesh.GetPath())
     api = UsdGeom.PrimvarsAPI(mesh.GetPrim())
-    sets = 0
     for primvar in api.FindPrimvarsWithInheritance():
-        kind = str(primvar.GetTypeName().scalarType)
         name = primvar.GetPrimvarName()
-        if kind in ("texCoord2f", "texCoord2d", "texCoord2h", "float2") and sets < 4:
-            values = _at_corners(primvar, time, out, 2, str(mesh.GetPath()), lost)
-            if values is not None:
-                # USD's v goes up, glTF's goes down.
-                out.corner[f"st:{name}"] = np.stack([values[:, 0], 1 - values[:, 1]], axis=1)
-                sets += 1
-        elif name == "displayColor":
-            values = _at_corners(primvar, time, out, 3, str(mesh.GetPath()), lost)
-            if values is not None:
-                out.corner["colour"] = values
-        elif name == "displayOpacity":
-            values = _at_corners(primvar, time, out, 1, str(mesh.GetPath()), lost)
-            if values is not None:
-                out.corner["opacity"] = values
+        if is_coordinates(primvar):
+            key, width = f"st:{name}", 2
+        elif name in DISPLAY:
+            key, width = DISPLAY[name]
+        else:
+            continue
+        values = _numbers(primvar, time, width)
+        if values is None:
+            continue
+        if width == 2:
+            # USD's v goes up, glTF's goes down.
+            values = np.stack([values[:, 0], 1 - values[:, 1]], axis=1)
+        if smooth and primvar.GetInterpolation() == UsdGeom.Tokens.vertex and len(values) >= len(out.points):
+            out.vertex[key] = values[: len(out.points)]
+            continue
+        values = _spread(values, primvar.GetInterpolation(), out, path, f"primvar {name}", lost)
+        if values is not None:
+            out.corner[key] = values
     # `primvars:normals` wins over the attribute `normals` (UsdGeomPointBased).
     normals = api.GetPrimvar("normals")
     values = None
     if normals and normals.HasValue():
-        values = _at_corners(normals, time, out, 3, str(mesh.GetPath()), lost)
+        values = _numbers(normals, time, 3)
+        if values is not None:
+            values = _spread(values, normals.GetInterpolation(), out, path, "primvar normals", lost)
     elif mesh.GetNormalsAttr().HasAuthoredValue():
         data = _array(mesh.GetNormalsAttr(), time, float).reshape(-1, 3)
-        values = _spread(data, mesh.GetNormalsInterpolation(), out, str(mesh.GetPath()), "normals", lost)
+        values = _spread(data, mesh.GetNormalsInterpolation(), out, path, "normals", lost)
     if values is not None:
         length = np.linalg.norm(values, axis=1, keepdims=True)
         out.corner["NORMAL"] = np.where(length > 1e-12, values / np.maximum(length, 1e-30), (0, 1, 0))
 
 
-def _at_corners(primvar: UsdGeom.Primvar, time: Usd.TimeCode, out: Polygons, width: int, path: str, lost: Lost) -> np.ndarray | None:
-    """A primvar's values at every corner, indices resolved; None if it has none or they do not fit."""
+def is_coordinates(primvar: UsdGeom.Primvar) -> bool:
+    """Whether a primvar may be texture coordinates."""
+    return str(primvar.GetTypeName().scalarType) in ("texCoord2f", "texCoord2d", "texCoord2h", "float2")
+
+
+def _numbers(primvar: UsdGeom.Primvar, time: Usd.TimeCode, width: int) -> np.ndarray | None:
+    """A primvar's values, indices resolved; None if it has none that are numbers."""
     data = primvar.ComputeFlattened(time) if primvar.IsIndexed() else primvar.Get(time)
     try:
         values = np.array(data, dtype=float).reshape(-1, width) if data is not None else None
     except (TypeError, ValueError):
-        values = None
-    if values is None or not np.isfinite(values).all():
         return None
-    return _spread(values, primvar.GetInterpolation(), out, path, f"primvar {primvar.GetPrimvarName()}", lost)
+    return values if values is not None and np.isfinite(values).all() else None
 
 
 def _spread(values: np.ndarray, interpolation: str, out: Polygons, path: str, name: str, lost: Lost) -> np.ndarray | None:

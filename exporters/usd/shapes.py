@@ -13,7 +13,7 @@ from ..common.morph import choose_targets
 from ..common.report import Lost
 from .gprims import read_gprim
 from .materials import Materials, bound_material
-from .mesh import Primitive, add_pose, faces_at, may_deform, read_mesh
+from .mesh import DISPLAY, Primitive, add_pose, faces_at, may_deform, read_mesh
 
 _DISPLAY = (0.5, 0.5, 0.5, 1.0)
 
@@ -136,9 +136,9 @@ class Geometries:
     def _constant_colour(self, prim: Usd.Prim, time: Usd.TimeCode, n: int) -> dict[str, np.ndarray]:
         """Display colour and opacity of a gprim, its own or inherited: the first value for all of it."""
         out = {}
-        for key, name in (("colour", "displayColor"), ("opacity", "displayOpacity")):
+        for name, (key, width) in DISPLAY.items():
             primvar = UsdGeom.PrimvarsAPI(prim).FindPrimvarWithInheritance(name)
-            values = np.array((primvar.ComputeFlattened(time) if primvar else None) or [], dtype=float).reshape(-1, 3 if key == "colour" else 1)
+            values = np.array((primvar.ComputeFlattened(time) if primvar else None) or [], dtype=float).reshape(-1, width)
             if len(values):
                 out[key] = np.tile(values[0], (n, 1))
             if len(np.unique(values, axis=0)) > 1:

@@ -2,7 +2,8 @@
 
 The rules are those of DeRose, Kass, Truong, "Subdivision Surfaces in Character Animation" (1998), with OpenSubdiv's
 boundary rule `edgeAndCorner` (USD's default) or `edgeOnly`, its blending of fractional sharpness, and uniform creasing
-(sharpness falls by one a level; 10 and more stays sharp for ever). Face-varying values are interpolated linearly within each face.
+(sharpness falls by one a level; 10 and more stays sharp for ever). Values at points follow the rules of the points;
+those at corners (face-varying and varying) are interpolated linearly within each face.
 """
 
 from __future__ import annotations
