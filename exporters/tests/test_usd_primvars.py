@@ -1,4 +1,4 @@
-"""Primvars of meshes: which are taken, and what subdivision makes of them."""
+"""Primvars of meshes: which are taken, what subdivision makes of them, and what instances inherit."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ pytest.importorskip("pxr", reason="SKIPPED LOUDLY: usd-core is not installed (pi
 import usd_scene as u
 from gltf_reader import primitive
 from PIL import Image
-from pxr import Sdf, UsdGeom
+from pxr import Sdf, Usd, UsdGeom
 
 SQUARE = [(0, 0), (1, 0), (1, 1), (0, 1)]
 # Unevenly spaced, so that smoothing moves the points within their plane.
@@ -77,3 +77,34 @@ def test_the_coordinates_that_a_material_reads_are_taken(usd_convert, material):
     assert not gltf.lost_features("/World/Card")
     assert {k for k in data["attributes"] if k.startswith("TEXCOORD")} == {"TEXCOORD_0"}
     assert {tuple(t) for t in arrays["TEXCOORD_0"].tolist()} == set(SQUARE)
+
+
+def test_instances_inherit_what_is_said_where_they_stand(usd_convert, tmp_path):
+    """Display colour, opacity and coordinates above an instance are its own."""
+    Image.new("RGB", (2, 2), (255, 0, 0)).save(tmp_path / "t.png")
+    asset = Usd.Stage.CreateNew(str(tmp_path / "asset.usda"))
+    asset.SetDefaultPrim(UsdGeom.Xform.Define(asset, "/Asset").GetPrim())
+    u.quad(asset, "/Asset/Card")
+    UsdGeom.Sphere.Define(asset, "/Asset/Ball")
+    material = u.preview(asset, "/Asset/M")
+    u.texture(asset, material, "diffuseColor", str(tmp_path / "t.png"))
+    u.bind(u.quad(asset, "/Asset/Picture"), material)
+    asset.Save()
+    made = u.stage(frames=None)
+    u.camera(made)
+    colours = {"Red": (1, 0, 0), "Blue": (0, 0, 1), "AlsoBlue": (0, 0, 1)}
+    for name, colour in colours.items():
+        prim = made.DefinePrim(f"/World/{name}", "Xform")
+        prim.GetReferences().AddReference(str(tmp_path / "asset.usda"))
+        prim.SetInstanceable(True)
+        api = UsdGeom.PrimvarsAPI(prim)
+        api.CreatePrimvar("displayColor", Sdf.ValueTypeNames.Color3fArray, "constant").Set([colour])
+        api.CreatePrimvar("st", Sdf.ValueTypeNames.TexCoord2fArray, "constant").Set([colour[:2]])
+    gltf = usd_convert(made)
+    for kind in ("Card", "Ball"):
+        meshes = [n["mesh"] for n in gltf.root["nodes"] if n["name"] == kind]
+        factors = [gltf.root["materials"][gltf.root["meshes"][m]["primitives"][0]["material"]]["pbrMetallicRoughness"]["baseColorFactor"] for m in meshes]
+        assert factors == [[*c, 1] for c in colours.values()]
+        assert meshes[1] == meshes[2] != meshes[0]
+    pictures = [gltf.root["meshes"][n["mesh"]]["primitives"][0]["attributes"]["TEXCOORD_0"] for n in gltf.root["nodes"] if n["name"] == "Picture"]
+    assert [gltf.accessor(p)[0].tolist() for p in pictures] == [[1, 1], [0, 1], [0, 1]]

@@ -22,11 +22,11 @@ from .shapes import Geometries
 from .skins import bake_skins
 from .stage import open_stage, reason
 from .textures import Textures
+from .tracks import Track, distinct, stands_still
 from .walk import Found, Walker
 
 _DEFAULT_WIDTH = 1280
 _LONGEST = 100_000
-_FAR = 1e5
 # Where the light comes from in a stage without a camera: above and behind the one who looks along -Z.
 _DOWNWARDS = np.array([[[0.8, -0.35, 0.49, 0], [0, 0.81, 0.58, 0], [-0.6, -0.47, 0.65, 0], [0, 0, 0, 1]]])
 
@@ -42,16 +42,6 @@ class Options:
     levels: int = 2
     camera_light: bool = True
     progress: Callable[[str], None] = lambda _line: None
-
-
-@dataclass
-class Track:
-    """One drawn thing, sampled."""
-
-    name: str
-    poses: list[np.ndarray] = field(default_factory=list)
-    visible: list[bool] = field(default_factory=list)
-    shapes: list[int | None] = field(default_factory=list)
 
 
 @dataclass
@@ -102,6 +92,8 @@ class _Conversion:
         if self.frames[1] - self.frames[0] > _LONGEST:
             raise InputError(f"frame range {self.frames[0]}-{self.frames[1]}: longer than {_LONGEST} frames; pass --frames FIRST-LAST")
         self.tracks: dict[tuple, Track] = {}
+        # What never changes has one sample.
+        self.still: set[tuple] = set()
         self.cameras: dict[tuple, CameraTrack] = {}
         # Cameras that cannot be used, with the reason.
         self.flaws: dict[str, str] = {}
@@ -159,12 +151,12 @@ class _Conversion:
                 for k in range(1, n):
                     self._at(first + i + k / n)
         order = np.argsort(np.array(self.taken), kind="stable")
-        for track in [*self.tracks.values(), *self.lights.values(), *self.cameras.values()]:
-            for name, values in vars(track).items():
-                if isinstance(values, list):
-                    setattr(track, name, [values[i] for i in order])
-        for key, track in [*self.tracks.items(), *self.lights.items(), *self.cameras.items()]:
-            if stands_still(np.array(track.poses)):
+        for key, track in self._all_tracks().items():
+            if key not in self.still:
+                for name, values in vars(track).items():
+                    if isinstance(values, list):
+                        setattr(track, name, [values[i] for i in order])
+            if stands_still(distinct(track.poses)):
                 self.lost.add(key[-1], "movement too far from the origin", "single precision cannot hold its steps; move the set to the origin")
         frames = [self.taken[i] for i in order]
         self.options.progress(f"writing {len(self.geometry.items)} meshes")
@@ -173,7 +165,7 @@ class _Conversion:
         materials = Materials(document, Textures(document, self.output, self.lost), self.lost, self._time(first))
         self.geometry.write(document, materials, np.array(self.taken))
         for track in self.tracks.values():
-            self._write_track(document, animation, track)
+            track.write(document, animation, self.geometry.items)
         for light in self.lights.values():
             light.write(document, animation, self.lost)
         for camera in self.cameras.values():
@@ -201,13 +193,16 @@ class _Conversion:
         predicate = Usd.TraverseInstanceProxies(Usd.PrimAllPrimsPredicate)
         return any(a.ValueMightBeTimeVarying() for p in Usd.PrimRange.Stage(self.stage, predicate) for a in p.GetAttributes())
 
+    def _all_tracks(self) -> dict[tuple, Track | LightTrack | CameraTrack]:
+        return self.tracks | self.lights | self.cameras
+
     def _steps(self) -> np.ndarray:
-        tracks = [t.poses for t in [*self.tracks.values(), *self.lights.values(), *self.cameras.values()]]
-        if not tracks:
+        poses = [distinct(t.poses) for t in self._all_tracks().values()]
+        moving = [p for p in poses if len(p) > 1]
+        if not moving:
             return np.ones(max(len(self.taken) - 1, 0), dtype=int)
-        poses = np.stack([np.array(t) for t in tracks], axis=1)
-        places = poses[..., :3, 3].reshape(-1, 3)
-        return motion.steps_between(poses, max(float(np.linalg.norm(np.ptp(places, axis=0))), 1.0))
+        places = np.concatenate([p[:, :3, 3] for p in poses])
+        return motion.steps_between(np.stack(moving, axis=1), max(float(np.linalg.norm(np.ptp(places, axis=0))), 1.0))
 
     def _time(self, frame: float) -> Usd.TimeCode:
         return Usd.TimeCode(frame * self.codes_per_frame)
@@ -218,8 +213,10 @@ class _Conversion:
         aspect = None
         if self.resolution is not None:
             aspect = self.resolution[0] * self.pixel_aspect / self.resolution[1]
-        for found in self.walker.at(time):
+        for found in self.walker.at(time, still=sample == 0):
             seen.add(found.key)
+            if found.still:
+                self.still.add(found.key)
             world = self.root @ found.matrix
             if not (np.abs(world) < 1e15).all():
                 self.lost.add(str(found.prim.GetPath()), "transform that is no usable number", "it is hidden while that lasts; check its xformOps")
@@ -242,7 +239,7 @@ class _Conversion:
             else:
                 self._drawn(found, world, time, sample)
         for key, track in [*self.tracks.items(), *self.lights.items()]:
-            if key not in seen:
+            if key not in seen and key not in self.still:
                 for name, values in vars(track).items():
                     if isinstance(values, list):
                         values.append(False if name == "visible" else values[-1])
@@ -256,34 +253,7 @@ class _Conversion:
         if shape is not None:
             world = world @ self.geometry.items[shape].placed
         for visible in [False] * (sample - len(track.poses)) + [found.visible and shape is not None]:
-            track.poses.append(world)
-            track.visible.append(visible)
-            track.shapes.append(shape)
-
-    def _write_track(self, document: Document, animation: motion.Animation, track: Track) -> None:
-        poses = np.array(track.poses)
-        for number in dict.fromkeys(n for n in track.shapes if n is not None):
-            item = self.geometry.items[number]
-            shown = np.array([v and n == number for v, n in zip(track.visible, track.shapes, strict=True)])
-            if not shown.any() or item.mesh is None:
-                continue
-            node: dict[str, Any] = {"name": track.name, "mesh": item.mesh}
-            if motion.is_sheared(poses):
-                upper, lower = motion.split_sheared(poses)
-                parent: dict[str, Any] = {"name": f"{track.name} (sheared)"}
-                above = document.append("nodes", parent)
-                index = document.append("nodes", node)
-                parent["children"] = [index]
-                animation.node(parent, above, upper)
-                animation.node(node, index, lower)
-            else:
-                index = document.append("nodes", node)
-                animation.node(node, index, poses)
-            if item.binding is not None:
-                node.setdefault("extensions", {})["BUZZ_analytic_shape"] = item.binding
-            animation.visibility(node, index, shown)
-            if item.weights is not None:
-                animation.weights(index, item.weights)
+            track.add(world, visible, shape)
 
     def _cuts(self) -> list[dict[str, Any]]:
         """The camera asked for, the render settings', the one bound in a viewer, or the first that moves."""
@@ -360,13 +330,3 @@ class _Conversion:
         now = self._time(self.frames[0])
         opened, closed = camera.GetShutterOpenAttr().Get(now), camera.GetShutterCloseAttr().Get(now)
         return (closed - opened) / self.codes_per_frame if closed > opened else None
-
-
-def stands_still(poses: np.ndarray) -> bool:
-    """Whether places so far out move by less than single precision, which glTF has, can tell apart there."""
-    places = poses[:, :3, 3]
-    steps = np.abs(np.diff(places, axis=0)).max(axis=0, initial=0)
-    far = np.abs(places).max(axis=0)
-    # Far less than that is the rounding of double precision, no movement.
-    rounding = np.spacing(far.astype(np.float32))
-    return bool(((far > _FAR) & (steps < rounding) & (steps > rounding * 1e-6)).any())

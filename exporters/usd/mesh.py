@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -63,13 +64,27 @@ def _array(attribute: Usd.Attribute, time: Usd.TimeCode, dtype: type) -> np.ndar
 def may_deform(prim: Usd.Prim) -> bool:
     """Whether the points or the faces of a mesh change."""
     mesh = UsdGeom.Mesh(prim)
-    moving = (mesh.GetPointsAttr(), mesh.GetNormalsAttr(), mesh.GetCreaseSharpnessesAttr(), mesh.GetCornerSharpnessesAttr())
-    return any(a.ValueMightBeTimeVarying() for a in (*moving, *_topology(mesh)))
+    return any(a.ValueMightBeTimeVarying() for a in (*_moving(mesh), *_topology(mesh)))
 
 
 def faces_at(prim: Usd.Prim, time: Usd.TimeCode) -> tuple[bytes, ...]:
     """What two times have to agree in for one to be a pose of the other."""
-    return tuple(_array(a, time, int).tobytes() for a in _topology(UsdGeom.Mesh(prim)))
+    return tuple(_digest(_array(a, time, int)) for a in _topology(UsdGeom.Mesh(prim)))
+
+
+def pose_at(prim: Usd.Prim, time: Usd.TimeCode) -> tuple[bytes, ...]:
+    """What two times agree in if they have the same pose."""
+    return tuple(_digest(_array(a, time, float)) for a in _moving(UsdGeom.Mesh(prim)))
+
+
+def _digest(values: np.ndarray | None) -> bytes:
+    return hashlib.blake2b(values if values is not None else b"", digest_size=16).digest()
+
+
+def _moving(mesh: UsdGeom.Mesh) -> tuple[Usd.Attribute, ...]:
+    normals = UsdGeom.PrimvarsAPI(mesh.GetPrim()).GetPrimvar("normals")
+    attributes = (mesh.GetPointsAttr(), mesh.GetNormalsAttr(), mesh.GetCreaseSharpnessesAttr(), mesh.GetCornerSharpnessesAttr())
+    return (*attributes, normals.GetAttr()) if normals else attributes
 
 
 def _topology(mesh: UsdGeom.Mesh) -> tuple[Usd.Attribute, ...]:
@@ -152,13 +167,10 @@ def _primvars(mesh: UsdGeom.Mesh, time: Usd.TimeCode, out: Polygons, smooth: boo
     path = str(mesh.GetPath())
     api = UsdGeom.PrimvarsAPI(mesh.GetPrim())
     for primvar in api.FindPrimvarsWithInheritance():
-        name = primvar.GetPrimvarName()
-        if is_coordinates(primvar):
-            key, width = f"st:{name}", 2
-        elif name in DISPLAY:
-            key, width = DISPLAY[name]
-        else:
+        name, taken = primvar.GetPrimvarName(), _taken(primvar)
+        if taken is None:
             continue
+        key, width = taken
         values = _numbers(primvar, time, width)
         if values is None:
             continue
@@ -186,9 +198,18 @@ def _primvars(mesh: UsdGeom.Mesh, time: Usd.TimeCode, out: Polygons, smooth: boo
         out.corner["NORMAL"] = np.where(length > 1e-12, values / np.maximum(length, 1e-30), (0, 1, 0))
 
 
-def is_coordinates(primvar: UsdGeom.Primvar) -> bool:
-    """Whether a primvar may be texture coordinates."""
-    return str(primvar.GetTypeName().scalarType) in ("texCoord2f", "texCoord2d", "texCoord2h", "float2")
+def inherited(prim: Usd.Prim, time: Usd.TimeCode) -> tuple:
+    """What a prim's geometry has from above it: names and values of primvars."""
+    found = [p for p in UsdGeom.PrimvarsAPI(prim).FindPrimvarsWithInheritance() if _taken(p) and p.GetAttr().GetPrim() != prim]
+    return tuple((p.GetPrimvarName(), p.GetInterpolation(), _digest(_numbers(p, time, _taken(p)[1]))) for p in found)
+
+
+def _taken(primvar: UsdGeom.Primvar) -> tuple[str, int] | None:
+    """What a primvar's values are called in here, and how many numbers each has; None for those that no picture shows."""
+    name = primvar.GetPrimvarName()
+    if str(primvar.GetTypeName().scalarType) in ("texCoord2f", "texCoord2d", "texCoord2h", "float2"):
+        return f"st:{name}", 2
+    return DISPLAY.get(name)
 
 
 def _numbers(primvar: UsdGeom.Primvar, time: Usd.TimeCode, width: int) -> np.ndarray | None:

@@ -13,7 +13,7 @@ from ..common.morph import choose_targets
 from ..common.report import Lost
 from .gprims import read_gprim
 from .materials import Materials, bound_material
-from .mesh import DISPLAY, Primitive, add_pose, faces_at, may_deform, read_mesh
+from .mesh import DISPLAY, Primitive, add_pose, faces_at, inherited, may_deform, pose_at, read_mesh
 
 _DISPLAY = (0.5, 0.5, 0.5, 1.0)
 
@@ -23,12 +23,14 @@ class Geometry:
     """What a prim is drawn with."""
 
     prim: Usd.Prim
-    prim_time: Usd.TimeCode
     primitives: list[Primitive]
     placed: np.ndarray = field(default_factory=lambda: np.eye(4))
     implicit: dict | None = None
-    # The samples at which poses were taken; the first belongs to the mesh itself.
+    faces: tuple[bytes, ...] = ()
+    # Numbers of its different poses (0 is the mesh itself), and which pose it has at which samples.
+    poses: dict[tuple[bytes, ...], int] = field(default_factory=dict)
     samples: list[int] = field(default_factory=list)
+    posed: list[int] = field(default_factory=list)
     mesh: int | None = None
     binding: dict | None = None
     weights: np.ndarray | None = None
@@ -40,6 +42,8 @@ class Geometries:
     def __init__(self, levels: int, lost: Lost) -> None:
         self.levels, self.lost = levels, lost
         self.items: list[Geometry] = []
+        self._sources: dict[Usd.Prim, tuple] = {}
+        self._deforms: dict[Usd.Prim, bool] = {}
         self._by_source: dict[tuple, list[int]] = {}
         self._current: dict[tuple, int] = {}
         self._sample = -1
@@ -48,11 +52,14 @@ class Geometries:
         """The geometry of a prim at a sample; None if there is nothing to draw."""
         if sample != self._sample:
             self._sample, self._current = sample, {}
-        source = _source(prim)
+        if prim not in self._sources:
+            self._sources[prim] = _source(prim, time)
+            self._deforms[prim] = kind == "mesh" and may_deform(prim)
+        source = self._sources[prim]
         if source in self._current:
             return self._current[source]
         known = self._by_source.setdefault(source, [])
-        if known and not (kind == "mesh" and may_deform(prim)):
+        if known and not self._deforms[prim]:
             return known[0]
         number = self._next(prim, kind, time, sample, known)
         if number is not None:
@@ -60,17 +67,18 @@ class Geometries:
         return number
 
     def _next(self, prim: Usd.Prim, kind: str, time: Usd.TimeCode, sample: int, known: list[int]) -> int | None:
-        for number in reversed(known):
-            item = self.items[number]
-            same = faces_at(prim, time) == faces_at(prim, item.prim_time)
-            if same and add_pose(item.primitives, prim, time, self.levels, self.lost):
-                item.samples.append(sample)
-                return number
         if kind == "mesh":
+            faces, pose = faces_at(prim, time), pose_at(prim, time)
+            for number in reversed(known):
+                item = self.items[number]
+                if item.faces == faces and (pose in item.poses or add_pose(item.primitives, prim, time, self.levels, self.lost)):
+                    item.posed.append(item.poses.setdefault(pose, len(item.poses)))
+                    item.samples.append(sample)
+                    return number
             primitives = read_mesh(prim, time, self.levels, self.lost)
             if not primitives:
                 return None
-            item = Geometry(prim, time, primitives, samples=[sample])
+            item = Geometry(prim, primitives, faces=faces, poses={pose: 0}, samples=[sample], posed=[0])
         else:
             shape = read_gprim(prim, time)
             if shape is None:
@@ -82,7 +90,7 @@ class Geometries:
             arrays = {"POSITION": shape.points.astype(np.float32), "NORMAL": shape.normals.astype(np.float32)}
             arrays |= self._constant_colour(prim, time, len(shape.points))
             primitive = Primitive(arrays, shape.indices.astype(np.uint32), prim, np.empty(0, int))
-            item = Geometry(prim, time, [primitive], shape.placed, shape.implicit, [sample])
+            item = Geometry(prim, [primitive], shape.placed, shape.implicit)
         self.items.append(item)
         known.append(len(self.items) - 1)
         return known[-1]
@@ -94,14 +102,18 @@ class Geometries:
 
     def _write(self, item: Geometry, document: Document, materials: Materials, taken: np.ndarray) -> None:
         chosen = None
-        if len(item.samples) > 1:
-            order = sorted(range(len(item.samples)), key=lambda k: taken[item.samples[k]])
-            times = taken[[item.samples[k] for k in order]]
-            rows = [np.concatenate([_pose(p, k)["POSITION"].reshape(-1) for p in item.primitives]) for k in order]
-            chosen = choose_targets(np.stack(rows), times, np.sort(taken))
+        if len(item.poses) > 1:
+            times = taken[item.samples]
+            order = np.argsort(times)
+            times, posed = times[order], np.array(item.posed)[order]
+            # Of poses that stay the same for a while the first and the last say all.
+            ends = np.diff(posed, prepend=-1, append=-1) != 0
+            kept = np.flatnonzero(ends[:-1] | ends[1:])
+            rows = [np.concatenate([_pose(p, k)["POSITION"].reshape(-1) for p in item.primitives]) for k in posed[kept]]
+            chosen = choose_targets(np.stack(rows), times[kept], np.sort(taken))
             if chosen is not None:
                 numbers, item.weights = chosen
-                chosen = [order[n] for n in numbers]
+                chosen = [int(posed[kept[n]]) for n in numbers]
         double = bool(UsdGeom.Gprim(item.prim).GetDoubleSidedAttr().Get())
         primitives = []
         for p in item.primitives:
@@ -179,12 +191,13 @@ class Geometries:
 _SIZES = ("radius", "size", "height", "radiusTop", "radiusBottom", "width", "length", "axis")
 
 
-def _source(prim: Usd.Prim) -> tuple:
-    """What makes two prims' geometry the same: the prim in the prototype and what is bound to it."""
-    shared = prim.GetPrimInPrototype() if prim.IsInstanceProxy() else prim
+def _source(prim: Usd.Prim, time: Usd.TimeCode) -> tuple:
+    """What makes two prims' geometry the same: the prim in the prototype, what is bound to it and what it inherits."""
     bound = [prim, *UsdShade.MaterialBindingAPI(prim).GetMaterialBindSubsets()]
     paths = [str(bound_material(getattr(b, "GetPrim", lambda b=b: b)()).GetPath()) for b in bound]
-    return (str(shared.GetPath()), *paths)
+    if not prim.IsInstanceProxy():
+        return (str(prim.GetPath()), *paths)
+    return (str(prim.GetPrimInPrototype().GetPath()), *paths, *inherited(prim, time))
 
 
 def _pose(p: Primitive, k: int) -> dict[str, np.ndarray]:

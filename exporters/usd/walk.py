@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from pxr import Usd, UsdGeom
@@ -21,6 +21,7 @@ _NAMED = {
     "TetMesh": "convert its surface to a mesh",
     "Volume": "render it separately",
 }
+_DEEPEST = 8
 _PURPOSES = (UsdGeom.Tokens.default_, UsdGeom.Tokens.render)
 
 
@@ -33,6 +34,18 @@ class Found:
     prim: Usd.Prim
     matrix: np.ndarray
     visible: bool
+    # Whether it is the same at all times.
+    still: bool
+
+
+@dataclass
+class _Moment:
+    """A time, and what has been worked out for it."""
+
+    time: Usd.TimeCode
+    cache: UsdGeom.XformCache
+    # Prototypes by their roots: kind, prim, path, matrix below the root (None for the root itself), whether it is shown.
+    prototypes: dict[Usd.Prim, list[tuple[str, Usd.Prim, str, np.ndarray | None, bool]]] = field(default_factory=dict)
 
 
 class Walker:
@@ -40,8 +53,9 @@ class Walker:
 
     def __init__(self, stage: Usd.Stage, lost: Lost) -> None:
         self.stage, self.lost = stage, lost
-        self.prims = list(self._list(stage.GetPseudoRoot()))
-        self._below: dict = {}
+        self._below: dict[Usd.Prim, list[tuple[str, Usd.Prim]]] = {}
+        self._changing: dict[Usd.Prim, bool] = {}
+        self.prims = [(kind, prim, self._still(kind, prim)) for kind, prim in self._list(stage.GetPseudoRoot())]
 
     def _list(self, root: Usd.Prim) -> Iterator[tuple[str, Usd.Prim]]:
         """Prims under `root` with their kinds; what is below a PointInstancer is its prototypes, not drawn where it is."""
@@ -85,27 +99,50 @@ class Walker:
             if primvar.HasAuthoredValue() and primvar.GetInterpolation() != UsdGeom.Tokens.constant:
                 self.lost.add(str(prim.GetPath()), f"{name} of each instance", "instances look as their prototype; make one prototype for each colour")
 
-    def at(self, time: Usd.TimeCode) -> Iterator[Found]:
-        """Everything at a time; matrices are columns-as-axes, in stage units."""
-        cache = UsdGeom.XformCache(time)
-        for kind, prim in self.prims:
-            matrix = column(cache.GetLocalToWorldTransform(prim))
-            visible = _visible(UsdGeom.Imageable(prim), time)
-            if kind == "instancer":
-                yield from self._instances(prim, matrix, visible, (str(prim.GetPath()),), time, cache, 0)
-            else:
-                yield Found((str(prim.GetPath()),), kind, prim, matrix, visible)
+    def _changes(self, prim: Usd.Prim) -> bool:
+        """Whether anything of a prim or above it has values for several times."""
+        if prim.IsPseudoRoot():
+            return False
+        if prim not in self._changing:
+            self._changing[prim] = self._changes(prim.GetParent()) or any(a.ValueMightBeTimeVarying() for a in prim.GetAttributes())
+        return self._changing[prim]
 
-    def _instances(self, prim, matrix, visible, key, time, cache, depth) -> Iterator[Found]:
+    def _still(self, kind: str, prim: Usd.Prim, depth: int = 0) -> bool:
+        """Whether a prim is the same at all times; of a PointInstancer, all its prototypes too."""
+        if self._changes(prim) or depth > _DEEPEST:
+            return False
+        roots = map(self.stage.GetPrimAtPath, UsdGeom.PointInstancer(prim).GetPrototypesRel().GetForwardedTargets()) if kind == "instancer" else ()
+        return all(self._still(*below, depth + 1) for root in roots if root for below in self._prototype(root))
+
+    def _prototype(self, root: Usd.Prim) -> list[tuple[str, Usd.Prim]]:
+        if root not in self._below:
+            self._below[root] = list(self._list(root))
+        return self._below[root]
+
+    def at(self, time: Usd.TimeCode, still: bool = True) -> Iterator[Found]:
+        """Everything at a time, what is the same at all times if asked for; matrices are columns-as-axes, in stage units."""
+        moment = _Moment(time, UsdGeom.XformCache(time))
+        for kind, prim, same in self.prims:
+            if same and not still:
+                continue
+            matrix = column(moment.cache.GetLocalToWorldTransform(prim))
+            found = Found((str(prim.GetPath()),), kind, prim, matrix, _visible(UsdGeom.Imageable(prim), time), same)
+            if kind == "instancer":
+                yield from self._instances(found, moment, 0)
+            else:
+                yield found
+
+    def _instances(self, found: Found, moment: _Moment, depth: int) -> Iterator[Found]:
         """The instances of a PointInstancer, nested ones too."""
+        prim, time = found.prim, moment.time
         instancer = UsdGeom.PointInstancer(prim)
         path = str(prim.GetPath())
-        if depth > 8:
+        if depth > _DEEPEST:
             self.lost.add(path, "PointInstancers nested more than eight deep", "flatten them")
             return
         which = instancer.GetProtoIndicesAttr().Get(time)
-        roots = instancer.GetPrototypesRel().GetForwardedTargets()
-        if which is None or not roots:
+        paths = instancer.GetPrototypesRel().GetForwardedTargets()
+        if which is None or not paths:
             return
         places = instancer.ComputeInstanceTransformsAtTime(time, time, UsdGeom.PointInstancer.IncludeProtoXform, UsdGeom.PointInstancer.IgnoreMask)
         mask = instancer.ComputeMaskAtTime(time)
@@ -115,27 +152,38 @@ class Walker:
             return
         if ids is None or len(set(ids)) < len(ids):
             ids = range(len(which))
+        roots = [self.stage.GetPrimAtPath(p) for p in paths]
+        placed = found.matrix @ np.array(places).reshape(-1, 4, 4).transpose(0, 2, 1)
         for i, number in enumerate(which):
             if number >= len(roots) or number < 0:
                 self.lost.add(path, f"prototype {number} that does not exist", "its instances are left out")
                 continue
-            root = self.stage.GetPrimAtPath(roots[number])
-            if not root:
-                self.lost.add(path, f"prototype {roots[number]} that does not exist", "its instances are left out")
+            if not roots[number]:
+                self.lost.add(path, f"prototype {paths[number]} that does not exist", "its instances are left out")
                 continue
-            if root not in self._below:
-                self._below[root] = list(self._list(root))
-            shown = visible and (not mask or bool(mask[i]))
-            place = matrix @ column(places[i])
-            name = (*key, int(ids[i]), int(number))
-            for kind, below in self._below[root]:
-                local = place if below == root else place @ column(cache.ComputeRelativeTransform(below, root)[0])
-                seen = shown and _shown_below(below, root, time)
-                whole = (*name, str(below.GetPath()))
+            shown = found.visible and (not mask or bool(mask[i]))
+            name = (*found.key, int(ids[i]), int(number))
+            for kind, below, where, local, seen in self._placed(roots[number], moment):
+                part = Found((*name, where), kind, below, placed[i] if local is None else placed[i] @ local, shown and seen, found.still)
                 if kind == "instancer":
-                    yield from self._instances(below, local, seen, whole, time, cache, depth + 1)
+                    yield from self._instances(part, moment, depth + 1)
                 elif kind not in ("camera", "dome"):
-                    yield Found(whole, kind, below, local, seen)
+                    yield part
+
+    def _placed(self, root: Usd.Prim, moment: _Moment) -> list[tuple[str, Usd.Prim, str, np.ndarray | None, bool]]:
+        """What is drawn of a prototype at a time."""
+        if root not in moment.prototypes:
+            moment.prototypes[root] = [
+                (
+                    kind,
+                    prim,
+                    str(prim.GetPath()),
+                    None if prim == root else column(moment.cache.ComputeRelativeTransform(prim, root)[0]),
+                    _shown_below(prim, root, moment.time),
+                )
+                for kind, prim in self._prototype(root)
+            ]
+        return moment.prototypes[root]
 
 
 def _visible(imageable: UsdGeom.Imageable, time: Usd.TimeCode) -> bool:
