@@ -159,6 +159,27 @@ def test_dome(usd_convert, tmp_path, turn):
         assert 0.5 + math.atan2(z, x) / (2 * math.pi) == pytest.approx(u_want, abs=1e-5)
 
 
+@pytest.mark.parametrize(("names", "carried"), [("RGB", True), ("RGBZ", True), ("Y", True), (("Combined.R", "Combined.G", "Combined.B"), False), ("", False)])
+def test_domes_of_other_channels(usd_convert, buzz, tmp_path, names, carried):
+    """A grey one is given colours, which the renderer wants; one of layers alone is named, and so is a damaged one."""
+    openexr = pytest.importorskip("OpenEXR")
+    header = {"compression": openexr.ZIP_COMPRESSION, "type": openexr.scanlineimage}
+    if names:
+        openexr.File(header, {n: np.full((4, 8), 0.5, np.float16) for n in names}).write(str(tmp_path / "sky.exr"))
+    else:
+        (tmp_path / "sky.exr").write_bytes(b"\x76\x2f\x31\x01 and no more")
+    made = u.stage(frames=None)
+    u.camera(made)
+    UsdLux.DomeLight(light(made, "DomeLight")).CreateTextureFileAttr("sky.exr")
+    gltf = usd_convert(made)
+    assert ("image" in gltf.buzz["world"]) == carried
+    assert gltf.lost_features("/World/Light") == ([] if carried else ["dome texture sky.exr is in a format that cannot be read"])
+    if carried:
+        with openexr.File(str(tmp_path / "anim_world.exr"), separate_channels=True) as image:
+            assert [float(image.channels()[c].pixels[0, 0]) for c in "RGB"] == [0.5] * 3
+    buzz("plan", gltf.path)
+
+
 def test_a_dome_that_changes_is_taken_where_it_is_first_seen(usd_convert):
     made = u.stage()
     u.camera(made)

@@ -19,6 +19,7 @@ from ..common.document import Document
 from ..common.extras import LUMENS_PER_WATT, tidy
 from ..common.motion import Animation, unscaled
 from ..common.report import Lost
+from . import exr
 from .output import Output
 from .textures import open_asset, resolved_path
 
@@ -240,6 +241,15 @@ def write_dome(prim: Usd.Prim, time: Usd.TimeCode, world: np.ndarray, up: str, o
     if layout not in ("automatic", "latlong"):
         lost.add(path, f"{layout} dome texture", "convert it to latlong; the dome is a plain colour")
         return out
+    if data[:4] == exr.MAGIC:
+        try:
+            data = exr.coloured(data)
+        except ImportError:
+            # What it holds cannot be found out; nearly all have colours.
+            pass
+        except (KeyError, OSError, RuntimeError):
+            lost.add(path, f"dome texture {asset.path} is in a format that cannot be read", "save it with channels R, G and B; the dome is a plain colour")
+            return out
     file = output.add(f"{output.target.stem}_world", suffix, data)
     turn = unscaled(world)[:3, :3]
     if prim.GetTypeName() == "DomeLight_1":

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import hashlib
 import io
-import tempfile
 from dataclasses import dataclass, replace
 from pathlib import Path
 from urllib.parse import quote
@@ -20,9 +19,9 @@ from pxr import Ar, Sdf
 from ..common.document import Document
 from ..common.report import Lost
 from ..common.srgb import decoded, encoded
+from . import exr
 from .output import Output
 
-_EXR_MAGIC = b"\x76\x2f\x31\x01"
 _DIRECT = {"PNG": ".png", "JPEG": ".jpg"}
 # Where a PNG says how many bits a channel has.
 _PNG_DEPTH = 24
@@ -71,8 +70,8 @@ class Textures:
         if asset not in self._pixels:
             data = self.raw(asset, path)
             try:
-                if data and data[:4] == _EXR_MAGIC:
-                    self._pixels[asset] = _exr_pixels(data)
+                if data and data[:4] == exr.MAGIC:
+                    self._pixels[asset] = exr.rgba(data)
                 else:
                     self._pixels[asset] = _image_pixels(data) if data else None
             except (UnidentifiedImageError, OSError, ImportError, KeyError, RuntimeError):
@@ -204,22 +203,6 @@ def _image_pixels(data: bytes) -> np.ndarray:
     # 16-bit and float greys, which Pillow would cut off at 255.
     grey = np.asarray(image, dtype=np.float32) / (65535 if image.mode[0] == "I" else 1)
     return np.stack([grey, grey, grey, np.ones_like(grey)], axis=2)
-
-
-def _exr_pixels(data: bytes) -> np.ndarray:
-    """RGBA of an OpenEXR image."""
-    import OpenEXR
-
-    with tempfile.NamedTemporaryFile(suffix=".exr") as file:
-        file.write(data)
-        file.flush()
-        with OpenEXR.File(file.name, separate_channels=True) as image:
-            channels = {k: np.asarray(c.pixels, dtype=np.float32) for k, c in image.channels().items()}
-    first = channels.get("R", channels.get("Y"))
-    if first is None:
-        raise KeyError("R")
-    planes = [*(channels.get(c, first) for c in "RGB"), channels.get("A", np.ones_like(first))]
-    return np.nan_to_num(np.stack(planes, axis=2))
 
 
 def _resized(plane: np.ndarray, width: int, height: int) -> np.ndarray:
