@@ -56,11 +56,11 @@ def test_files_of_others_are_left_alone(shot, tmp_path):
     first = files(out)
     assert {k: first[k] for k in others} == others
     names = [root["images"][0]["uri"], root["scenes"][0]["extras"]["buzz"]["world"]["image"], root["buffers"][0]["uri"]]
-    assert names == ["a_textures/t_0_2.png", "a_world_2.png", "a_2.bin"]
+    assert names == ["a_textures/t_0-2.png", "a_world-2.png", "a-2.bin"]
     shot()
     assert files(out) == first
     shot(textured=False)
-    assert set(files(out)) == {*others, "a.gltf", "a_2.bin"}
+    assert set(files(out)) == {*others, "a.gltf", "a-2.bin"}
 
 
 def test_what_is_no_longer_used_goes(shot, tmp_path):
@@ -75,7 +75,7 @@ def test_a_glb_knows_its_sky_again(shot, tmp_path):
         shot("a.glb")
         assert set(files(tmp_path / "out")) == {"a.glb", "a_world.png"}
     shot("a.gltf")
-    assert "a_world_2.png" in files(tmp_path / "out")
+    assert "a_world-2.png" in files(tmp_path / "out")
 
 
 @pytest.mark.parametrize("content", ['{"asset":{"version":"2.0","generator":"Another"}}', '{"asset":{"version":"2.0"}}', "[]", ""])
@@ -86,6 +86,17 @@ def test_a_target_of_another_program_is_refused(shot, tmp_path, name, content):
     with pytest.raises(OutputError, match="choose another name"):
         shot(name)
     assert files(tmp_path / "out") == {name: content.encode()}
+
+
+def test_what_the_exporter_for_blender_made_is_replaced(shot, tmp_path):
+    made = {"images": [{"uri": "a_textures/Wood.png"}], "buffers": [{"uri": "a.bin"}], "asset": {"version": "2.0", "generator": "Khronos"}}
+    made["scenes"] = [{"extras": {"buzz": {"generator": "Buzz exporter for Blender 1.0.0"}}}]
+    (tmp_path / "out" / "a_textures").mkdir(parents=True)
+    (tmp_path / "out" / "a.gltf").write_text(json.dumps(made))
+    for name in ("a_textures/Wood.png", "a.bin"):
+        (tmp_path / "out" / name).write_bytes(b"old")
+    shot()
+    assert set(files(tmp_path / "out")) == {"a.gltf", "a.bin", "a_world.png", "a_textures/t_0.png"}
 
 
 def test_what_a_file_refers_to_elsewhere_stays(shot, tmp_path):

@@ -51,7 +51,7 @@ class Output:
     def add(self, name: str, suffix: str, data: bytes) -> str:
         """Take in a file beside the target; its name, with a number where somebody's file has that name."""
         for number in itertools.count(1):
-            file = f"{name}{f'_{number}' if number > 1 else ''}{suffix}"
+            file = f"{name}{f'-{number}' if number > 1 else ''}{suffix}"
             path = self.target.parent / file
             if path not in self._ready and (path in self._own or not os.path.lexists(path)):
                 self._write(path, data)
@@ -74,7 +74,8 @@ class Output:
             self._write(self.target, b"".join(gltf.save_to_bytes()))
         self._move()
         for path in self._own - set(self._ready):
-            path.unlink(missing_ok=True)
+            with contextlib.suppress(OSError):
+                path.unlink()
             if path.parent != self.target.parent:
                 _remove_if_empty(path.parent)
 
@@ -125,9 +126,10 @@ def _files_of(target: Path) -> set[Path]:
     """The file of the export before and those it refers to; nothing where there is none."""
     try:
         root = _json(target)
-        made_here = str(root["asset"]["generator"]).startswith("Buzz ")
+        buzz = root["scenes"][0]["extras"]["buzz"]
+        made_here = buzz["generator"].startswith("Buzz ")
         names = [item.get("uri", "") for key in ("images", "buffers") for item in root.get(key, [])]
-        names.append((root["scenes"][0]["extras"]["buzz"].get("world") or {}).get("image", ""))
+        names.append((buzz.get("world") or {}).get("image", ""))
     except FileNotFoundError:
         return set()
     except OSError as error:
@@ -137,7 +139,7 @@ def _files_of(target: Path) -> set[Path]:
     if not made_here:
         raise OutputError(f"{target}: no exporter of Buzz made this file; move it away or choose another name")
     # Whatever else a file refers to was put there by hand.
-    ours = re.compile(rf"{re.escape(target.stem)}(_textures/[^/\\]+\.(png|jpg)|_world(_\d+)?\.\w+|(_\d+)?\.bin)")
+    ours = re.compile(rf"{re.escape(target.stem)}(-\d+)?(_textures/[^/\\]+\.(png|jpg)|_world(-\d+)?\.\w+|\.bin)")
     return {target, *(target.parent / unquote(n) for n in names if ours.fullmatch(unquote(n)))}
 
 
