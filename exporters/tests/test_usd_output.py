@@ -110,6 +110,15 @@ def test_what_a_file_refers_to_elsewhere_stays(shot, tmp_path):
     assert mine.read_bytes() == b"mine"
 
 
+def test_a_folder_in_place_of_our_file_stays(shot, tmp_path):
+    shot()
+    (tmp_path / "out" / "a.bin").unlink()
+    (tmp_path / "out" / "a.bin").mkdir()
+    (tmp_path / "out" / "a.bin" / "kept").write_text("mine")
+    assert shot()["buffers"][0]["uri"] == "a-2.bin"
+    assert (tmp_path / "out" / "a.bin" / "kept").read_text() == "mine"
+
+
 def test_a_failed_export_leaves_nothing(shot, tmp_path):
     (tmp_path / "out" / "a.gltf").mkdir(parents=True)
     with pytest.raises(OutputError, match=r"a\.gltf: cannot be written"):

@@ -140,7 +140,8 @@ def _files_of(target: Path) -> set[Path]:
         raise OutputError(f"{target}: no exporter of Buzz made this file; move it away or choose another name")
     # Whatever else a file refers to was put there by hand.
     ours = re.compile(rf"{re.escape(target.stem)}(-\d+)?(_textures/[^/\\]+\.(png|jpg)|_world(-\d+)?\.\w+|\.bin)")
-    return {target, *(target.parent / unquote(n) for n in names if ours.fullmatch(unquote(n)))}
+    paths = (target.parent / unquote(n) for n in names if ours.fullmatch(unquote(n)))
+    return {target, *(p for p in paths if p.is_file())}
 
 
 def _json(path: Path) -> Any:
