@@ -13,6 +13,7 @@ import re
 import shutil
 import struct
 import tempfile
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 from urllib.parse import quote, unquote
@@ -50,13 +51,13 @@ class Output:
 
     def add(self, name: str, suffix: str, data: bytes) -> str:
         """Take in a file beside the target; its name, with a number where somebody's file has that name."""
-        for number in itertools.count(1):
-            file = f"{name}{f'-{number}' if number > 1 else ''}{suffix}"
-            path = self.target.parent / file
-            if path not in self._ready and (path in self._own or not os.path.lexists(path)):
-                self._write(path, data)
-                return file
-        raise AssertionError
+        names = (f"{name}{number}{suffix}" for number in itertools.chain([""], (f"-{n}" for n in itertools.count(2))))
+        file = next(n for n in names if self._is_free(self.target.parent / n))
+        self._write(self.target.parent / file, data)
+        return file
+
+    def _is_free(self, path: Path) -> bool:
+        return path not in self._ready and (path in self._own or not os.path.lexists(path))
 
     def finish(self, document: Document) -> None:
         """Write the document and move all files to their places, the target last."""
@@ -105,7 +106,7 @@ class Output:
             undo.pop_all()
 
 
-def _set_aside(path: Path, old: Path):
+def _set_aside(path: Path, old: Path) -> Callable[[], None]:
     """Move a file away, if it is there; what brings back how it was."""
     if not os.path.lexists(path):
         return lambda: path.unlink(missing_ok=True)
