@@ -80,12 +80,14 @@ def test_a_glb_knows_its_sky_again(shot, tmp_path):
 
 @pytest.mark.parametrize("content", ['{"asset":{"version":"2.0","generator":"Another"}}', '{"asset":{"version":"2.0"}}', "[]", ""])
 @pytest.mark.parametrize("name", ["a.gltf", "a.glb"])
-def test_a_target_of_another_program_is_refused(shot, tmp_path, name, content):
+def test_a_target_of_another_program_is_replaced_without_what_is_beside_it(shot, tmp_path, name, content):
     (tmp_path / "out").mkdir()
     (tmp_path / "out" / name).write_text(content)
-    with pytest.raises(OutputError, match="choose another name"):
-        shot(name)
-    assert files(tmp_path / "out") == {name: content.encode()}
+    (tmp_path / "out" / "a.bin").write_text("theirs")
+    shot(name)
+    written = files(tmp_path / "out")
+    assert written["a.bin"] == b"theirs" and written[name] != content.encode()
+    assert name == "a.glb" or "a-2.bin" in written
 
 
 def test_what_the_exporter_for_blender_made_is_replaced(shot, tmp_path):

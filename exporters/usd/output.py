@@ -137,8 +137,9 @@ def _files_of(target: Path) -> set[Path]:
         raise _unwritable(target, error) from error
     except (ValueError, LookupError, TypeError, AttributeError, struct.error):
         made_here = False
+    # The target itself was named by whoever exports; what another program put beside it was not.
     if not made_here:
-        raise OutputError(f"{target}: no exporter of Buzz made this file; move it away or choose another name")
+        return {target}
     # Whatever else a file refers to was put there by hand.
     ours = re.compile(rf"{re.escape(target.stem)}(-\d+)?(_textures/[^/\\]+\.(png|jpg)|_world(-\d+)?\.\w+|\.bin)")
     paths = (target.parent / unquote(n) for n in names if ours.fullmatch(unquote(n)))
