@@ -23,9 +23,10 @@ pub fn run(args: CompareArgs) -> Result<ExitCode> {
     if under + missing == 0 {
         return Ok(ExitCode::SUCCESS);
     }
-    say::complain(format_args!(
-        "{}: {under} frames are under {limit} dB, and {missing} of the reference are not there",
-        args.dir.display()
-    ));
+    let under = if under > 0 { format!("frames under {limit} dB: {under}") } else { String::new() };
+    let missing =
+        if missing > 0 { format!("frames only in the reference: {missing}") } else { String::new() };
+    let and = if under.is_empty() || missing.is_empty() { "" } else { "; " };
+    say::complain(format_args!("{}: {under}{and}{missing}", args.dir.display()));
     Ok(ExitCode::from(1))
 }

@@ -1,7 +1,9 @@
 //! `buzz-convert INPUT OUT_DIR`: the main job.
 
 use super::args::{CompressionArg, ConvertArgs};
-use super::existing::{existing, place_of, prepare_report, refuse_input, refuse_report_of_another};
+use super::existing::{
+    existing, place_of, prepare_report, refuse_input, refuse_report_of_another, remove_report,
+};
 use super::interrupt::Interrupt;
 use super::job::{Job, stem, warn_of_ignored};
 use super::plan_file::PlanFile;
@@ -107,10 +109,12 @@ pub fn run(args: ConvertArgs) -> Result<ExitCode> {
         settings_hash: hash.clone(),
     };
     let mut sink = ExrSink::new(folder, options)?;
-    let pixels = job.settings.window.pixels() as u64;
+    if args.output.overwrite && !to_render.is_empty() {
+        remove_report(&report_path)?;
+    }
     let count = to_render.iter().flat_map(|&f| pictures_of(f, &job.settings)).count();
     let work = Work { frames: count, on_the_way: plan.on_the_way(&to_render) };
-    let progress = Progress::new(args.output.progress, work, pixels, interrupt);
+    let progress = Progress::new(args.output.progress, work, interrupt);
     let mut thumbnails = Thumbnails::of(&frames);
     for record in skipped.iter().filter(|r| r.id.eye != Some(StereoEye::Right)) {
         thumbnails.read(record.id.number, &sink.folder().file_of(record.id));
@@ -130,14 +134,17 @@ pub fn run(args: ConvertArgs) -> Result<ExitCode> {
         }
     }
     records.sort_by_key(|r| r.id);
-    for (frame, values) in sink.repaired() {
+    if let [(first, _), rest @ ..] = sink.repaired().as_slice() {
+        let frames = if rest.is_empty() { String::new() } else { format!(" and {} more", rest.len()) };
+        let values: u64 = sink.repaired().iter().map(|(_, values)| values).sum();
         warnings.add(format!(
-            "frame {frame}: {values} values were not finite or too large for their channel and were replaced"
+            "frame {first}{frames}: {values} values were not finite or too large for their channel and were replaced"
         ));
     }
 
     let (report_folder, report_name) = place_of(&report_path);
-    let mut runs = earlier_runs(&mut records, report_folder, &report_name, &hash);
+    let (mut runs, said) = earlier_runs(&mut records, report_folder, &report_name, &hash);
+    said.into_iter().for_each(|warning| warnings.add_unless_given(warning));
     let seconds = RunSeconds {
         import: job.import_seconds,
         accel: job.accel_seconds,
@@ -243,6 +250,12 @@ impl Warnings {
     fn add(&mut self, warning: String) {
         say::complain(format_args!("warning: {warning}"));
         self.given.push(warning);
+    }
+
+    fn add_unless_given(&mut self, warning: String) {
+        if !self.given.contains(&warning) {
+            self.add(warning);
+        }
     }
 }
 

@@ -130,6 +130,12 @@ pub fn refuse_input<'a>(path: &Path, mut inputs: impl Iterator<Item = &'a PathBu
 /// report. What is not even whole is nobody's.
 pub fn refuse_report_of_another(path: &Path, input: &Path) -> Result<()> {
     let Some(report) = Report::read(path) else {
+        let page = path.with_extension("html");
+        if std::fs::read_to_string(&page).is_ok_and(|text| !text.contains("Buzz report")) {
+            let message =
+                "is no page of this program; give --report another name, or --overwrite to replace it";
+            return Err(Error::output(page, message).into());
+        }
         let bytes = std::fs::read(path).unwrap_or_default();
         if serde_json::from_slice::<serde_json::Value>(&bytes).is_err() {
             return Ok(());
@@ -138,7 +144,8 @@ pub fn refuse_report_of_another(path: &Path, input: &Path) -> Result<()> {
             "is no report of this program; give --report another name, or --overwrite to replace it";
         return Err(Error::output(path, message).into());
     };
-    if Path::new(&report.input).file_name() == input.file_name() {
+    // In a report names are text.
+    if Path::new(&report.input).file_name() == Path::new(&*input.to_string_lossy()).file_name() {
         return Ok(());
     }
     let message = format!(
@@ -146,6 +153,19 @@ pub fn refuse_report_of_another(path: &Path, input: &Path) -> Result<()> {
         report.input
     );
     Err(Error::output(path, message).into())
+}
+
+/// Removes the report of frames that are about to be replaced: of an interrupted run it would say what is not so.
+pub fn remove_report(path: &Path) -> Result<()> {
+    for file in [path.to_path_buf(), path.with_extension("html")] {
+        match std::fs::remove_file(&file) {
+            Err(e) if e.kind() != std::io::ErrorKind::NotFound => {
+                return Err(Error::output(file, format!("{e}: the old report cannot be replaced")).into());
+            }
+            _ => {}
+        }
+    }
+    Ok(())
 }
 
 /// The folder of a file, and its name in it.

@@ -7,10 +7,11 @@
 
 use super::args::{Cli, PlanArgs, QualityArg};
 use super::job::{Job, stem};
-use super::one_line;
 use super::plan_file::PlanFile;
+use super::{one_line, parse};
 use anyhow::Result;
 use buzz::error::Error;
+use buzz::output::NamePattern;
 use buzz::plan::{Plan, Segment, Share};
 use clap::{Parser, ValueEnum};
 use serde_json::{Value, json};
@@ -155,7 +156,15 @@ fn check(command: &[String], parameters: &[Value]) -> Result<()> {
         return Err(Error::Usage(message).into());
     }
     let parsed = Cli::try_parse_from(std::iter::once("buzz-convert".to_owned()).chain(resolved));
-    parsed.map_err(|e| Error::Usage(one_line(&e.to_string())))?;
+    let task = parsed.map_err(|e| Error::Usage(one_line(&e.to_string())))?.convert.output;
+    if task.report.is_some() {
+        return Err(Error::Usage("--report: each task writes its own report; leave it out".into()).into());
+    }
+    // What a task would find out about its options before it reads the scene.
+    parse::aovs(&task.aov)?;
+    task.stereo.map(|eyes| parse::stereo(eyes, task.convergence)).transpose()?;
+    task.memory.as_deref().map(parse::memory).transpose()?;
+    NamePattern::parse(task.name.as_deref().unwrap_or(NamePattern::DEFAULT), "shot")?;
     Ok(())
 }
 

@@ -17,7 +17,6 @@ pub struct Progress {
     done: usize,
     /// Frames made that were not asked for.
     passed: usize,
-    pixels: u64,
     tally: Tally,
     start: Instant,
     interrupt: Arc<Interrupt>,
@@ -67,8 +66,8 @@ impl Tally {
 }
 
 impl Progress {
-    /// Progress of `work` on frames of `pixels` pixels; `interrupt` knows whether to stop.
-    pub fn new(style: ProgressArg, work: Work, pixels: u64, interrupt: Arc<Interrupt>) -> Self {
+    /// Progress of `work`; `interrupt` knows whether to stop.
+    pub fn new(style: ProgressArg, work: Work, interrupt: Arc<Interrupt>) -> Self {
         let total = work.frames + work.on_the_way;
         let style = match style {
             ProgressArg::Auto if std::io::stderr().is_terminal() => Style::Bar(bar(total)),
@@ -78,7 +77,7 @@ impl Progress {
             ProgressArg::None => Style::None,
         };
         let (tally, start) = (Tally::default(), Instant::now());
-        Self { style, work, done: 0, passed: 0, pixels, tally, start, interrupt }
+        Self { style, work, done: 0, passed: 0, tally, start, interrupt }
     }
 
     /// Leaves the terminal as it was.
@@ -99,6 +98,7 @@ impl Progress {
         let what = format!("on the way, {} of {}", self.passed, self.work.on_the_way);
         match &self.style {
             Style::Bar(bar) => {
+                bar.set_style(style(RUNNING));
                 bar.set_message(format!("frame {frame} {what}"));
                 bar.inc(1);
             }
@@ -121,9 +121,10 @@ impl Progress {
             FrameKind::Inferred { .. } if frame.eye == Some(StereoEye::Right) => "inferred from left".into(),
             FrameKind::Inferred { from } => format!("inferred from {from}"),
         };
-        let share = 100.0 * stats.rays.primary as f64 / self.pixels.max(1) as f64;
+        let share = 100.0 * stats.traced_share();
         match &self.style {
             Style::Bar(bar) => {
+                bar.set_style(style(RUNNING));
                 bar.set_message(format!("frame {frame} {how}{saved}"));
                 bar.inc(1);
             }
@@ -145,10 +146,18 @@ impl Progress {
     }
 }
 
+/// Once a frame is there.
+const RUNNING: &str = "{bar:30} {pos}/{len}  {msg}  {eta} left";
+
+fn style(template: &str) -> ProgressStyle {
+    ProgressStyle::with_template(template).unwrap_or_else(|_| ProgressStyle::default_bar())
+}
+
 fn bar(total: usize) -> ProgressBar {
     let bar = ProgressBar::with_draw_target(Some(total as u64), ProgressDrawTarget::stderr());
-    let template = "{bar:30} {pos}/{len}  {msg}  {eta} left";
-    bar.set_style(ProgressStyle::with_template(template).unwrap_or_else(|_| ProgressStyle::default_bar()));
+    // Nobody knows how long it will take before the first frame.
+    bar.set_style(style("{bar:30} {pos}/{len}  {msg}"));
+    bar.set_message("first frame");
     bar.enable_steady_tick(Duration::from_millis(250));
     bar
 }

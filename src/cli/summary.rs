@@ -80,7 +80,7 @@ pub fn summary(report: &Report) -> String {
         totals.traced_frames,
         totals.inferred_frames,
         wall,
-        saved.unwrap_or_else(|| "no key frame among these frames to measure the saving against".into()),
+        saved.unwrap_or_else(|| "rays saved unknown: no key frame among these frames to compare with".into()),
         s.import,
         s.accel,
         s.plan,

@@ -107,3 +107,13 @@ pub struct FrameStats {
     /// Reused samples that something hides from the eye, where audited.
     pub hidden: Option<u64>,
 }
+
+impl FrameStats {
+    /// Share of pixels for which a camera ray was cast.
+    pub fn traced_share(&self) -> f64 {
+        let is_traced = |class: &&super::PixelClass| !class.is_reused();
+        let count = |class: &super::PixelClass| self.pixels[*class as usize];
+        let traced: u64 = super::PixelClass::ALL.iter().filter(is_traced).map(count).sum();
+        traced as f64 / self.pixels.iter().sum::<u64>().max(1) as f64
+    }
+}

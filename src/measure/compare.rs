@@ -135,6 +135,9 @@ impl Pair {
     fn compare(&self, exposure: Exposure, pictures: Option<&Path>) -> Result<(FrameError, bool)> {
         let a: ReadFrame = read_frame(&self.sequence)?;
         let b = read_frame(&self.reference)?;
+        for (path, frame) in [(&self.sequence, &a), (&self.reference, &b)] {
+            refuse_no_number(path, frame)?;
+        }
         let window = |f: &ReadFrame| (f.origin, f.width, f.height);
         if window(&a) != window(&b) {
             let size = |f: &ReadFrame| format!("{}x{} from {},{}", f.width, f.height, f.origin.0, f.origin.1);
@@ -162,6 +165,18 @@ impl Pair {
         let file = folder.join(file_name(&self.sequence)).with_extension("png");
         picture::write_png(&picture::contact_sheet(&parts, 3, width), &file)
     }
+}
+
+/// What is no brightness cannot be told from another: taken for black, it would be the same as black.
+fn refuse_no_number(path: &Path, frame: &ReadFrame) -> Result<()> {
+    let is_none = |pixel: &[f32; 4]| pixel[..3].iter().any(|v| v.is_nan() || *v == f32::NEG_INFINITY);
+    let Some(first) = frame.color.iter().position(is_none) else { return Ok(()) };
+    let (count, width) = (frame.color.iter().filter(|pixel| is_none(pixel)).count(), frame.width);
+    let place = format!("pixel {},{}", first % width, first / width);
+    let message = format!(
+        "it is no number, as {count} pixels are here, and cannot be compared; render the frame again"
+    );
+    Err(Error::input(path, place, message))
 }
 
 impl MeanError {

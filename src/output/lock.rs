@@ -26,6 +26,8 @@ const PREFIX: &str = ".buzz-";
 const SUFFIX: &str = ".lock";
 /// Taken for moments only, while a run looks for others and registers itself.
 const REGISTER: &str = ".buzz.lock";
+/// Between names in a list: the one character beside the folders' that no name has.
+const SEPARATOR: &str = "\0";
 /// Largest list of names that is read from another run's lock.
 const LONGEST_LIST: u64 = 64 << 20;
 
@@ -44,7 +46,7 @@ impl FrameLock {
         let mut file = Temporary::new(folder, PREFIX, SUFFIX).map_err(|e| explain(folder, &e))?;
         let claim = |file: &mut File| {
             file.try_lock()?;
-            file.write_all(names.join("\n").as_bytes())?;
+            file.write_all(names.join(SEPARATOR).as_bytes())?;
             // Other machines see what has reached the server.
             file.sync_all()
         };
@@ -83,7 +85,7 @@ fn refuse_if_claimed(folder: &Path, names: &[String]) -> Result<()> {
         }
         let mut list = String::new();
         file.take(LONGEST_LIST).read_to_string(&mut list).map_err(|e| explain(&path, &e))?;
-        if let Some(claimed) = list.lines().find(|n| wanted.contains(n)) {
+        if let Some(claimed) = list.split(SEPARATOR).find(|n| wanted.contains(n)) {
             let message = format!(
                 "another run ({name}) is writing it: wait for that run, or choose other --frames or another folder"
             );
@@ -176,9 +178,17 @@ mod tests {
     }
 
     #[test]
+    fn names_of_several_lines_are_names() {
+        let folder = tempfile::tempdir().unwrap();
+        let name = ["two\nlines.0001.exr".to_owned()];
+        let _held = FrameLock::acquire(folder.path(), &name).unwrap();
+        FrameLock::acquire(folder.path(), &name).unwrap_err();
+    }
+
+    #[test]
     fn a_dead_runs_lock_is_removed() {
         let folder = tempfile::tempdir().unwrap();
-        fs::write(folder.path().join(".buzz-1-0.lock"), names(1..10).join("\n")).unwrap();
+        fs::write(folder.path().join(".buzz-1-0.lock"), names(1..10).join(SEPARATOR)).unwrap();
         fs::write(folder.path().join(REGISTER), "").unwrap();
         let lock = FrameLock::acquire(folder.path(), &names(1..10)).unwrap();
         assert!(!folder.path().join(".buzz-1-0.lock").exists());

@@ -54,7 +54,7 @@ impl Run {
 }
 
 /// Gives each skipped frame of `records` the times of the run that rendered it; returns the runs that they come from, in
-/// the order in which they began.
+/// the order in which they began, and what these warned of.
 ///
 /// Looks at the reports that the files `report*.json` in `folder` hold, and at the one named `own`, which is about to be
 /// replaced, as far as they are of the same settings. Whatever else stands there tells nothing, and is no error.
@@ -63,10 +63,10 @@ pub fn earlier_runs(
     folder: &Path,
     own: &str,
     settings_hash: &SettingsHash,
-) -> Vec<Run> {
-    let mut runs: Vec<Run> = Vec::new();
+) -> (Vec<Run>, Vec<String>) {
+    let (mut runs, mut warnings) = (Vec::<Run>::new(), Vec::new());
     if !records.iter().any(|r| r.skipped) {
-        return runs;
+        return (runs, warnings);
     }
     for name in report_names(folder, own) {
         let Some(report) = Report::read(&folder.join(name)).filter(|r| r.settings_hash == *settings_hash)
@@ -84,9 +84,12 @@ pub fn earlier_runs(
         let is_new = |run: &Run| !runs.iter().any(|r| (r.started, &r.report) == (run.started, &run.report));
         let new: Vec<Run> = report.runs.into_iter().filter(|run| used && is_new(run)).collect();
         runs.extend(new);
+        let is_said = |warning: &String| !used || warnings.contains(warning);
+        let unsaid: Vec<_> = report.warnings.into_iter().filter(|warning| !is_said(warning)).collect();
+        warnings.extend(unsaid);
     }
     runs.sort_by_key(|run| run.started);
-    runs
+    (runs, warnings)
 }
 
 /// Names of files that may be reports, in one order everywhere.
@@ -151,7 +154,7 @@ mod tests {
 
         for repetition in 1..=2u32 {
             let mut frames = vec![record(1, 0.0), record(2, 0.0), record(3, 0.0)];
-            let mut runs = earlier_runs(&mut frames, folder, "report.json", &hash("a"));
+            let (mut runs, _) = earlier_runs(&mut frames, folder, "report.json", &hash("a"));
             runs.push(run("report.json", 10 + u64::from(repetition), 1));
             let report = write(folder, "report.json", "a", frames, runs);
             let names: Vec<&str> = report.runs.iter().map(|r| r.report.as_str()).collect();
@@ -168,7 +171,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         write(folder.path(), "own.json", "a", vec![record(1, 5.0)], vec![run("own.json", 1, 1)]);
         let mut frames = [record(1, 2.0)];
-        assert_eq!(earlier_runs(&mut frames, folder.path(), "own.json", &hash("a")), []);
+        assert_eq!(earlier_runs(&mut frames, folder.path(), "own.json", &hash("a")).0, []);
         assert_eq!(frames[0], record(1, 2.0));
     }
 }

@@ -79,17 +79,17 @@ fn temporary_of(name: &str) -> Option<&str> {
 pub(super) fn explain(path: &Path, error: &io::Error) -> Error {
     let advice = match error.kind() {
         io::ErrorKind::StorageFull | io::ErrorKind::QuotaExceeded => {
-            ": free some space, then run again with --skip-existing"
+            ": free some space, then run again (what is whole stays with --skip-existing)"
         }
         io::ErrorKind::PermissionDenied | io::ErrorKind::ReadOnlyFilesystem => {
             ": choose a folder that may be written to"
         }
         io::ErrorKind::NotFound => ": see whether its folder is there",
-        io::ErrorKind::FileTooLarge => ": raise the limit on file sizes, then run again with --skip-existing",
+        io::ErrorKind::FileTooLarge => ": raise the limit on file sizes, then run again",
         io::ErrorKind::NotADirectory | io::ErrorKind::AlreadyExists => ": it must be a folder",
         io::ErrorKind::IsADirectory => ": it must be a file; move the folder away",
         io::ErrorKind::StaleNetworkFileHandle | io::ErrorKind::TimedOut => {
-            ": see whether the folder is still connected, then run again with --skip-existing"
+            ": see whether the folder is still connected, then run again"
         }
         _ => "",
     };

@@ -188,3 +188,15 @@ fn levels_are_one_to_three() {
         assert!(!Path::new(folder).exists());
     }
 }
+
+#[test]
+fn no_more_pixels_are_traced_than_there_are() {
+    let (folder, out) = fresh();
+    let scene = Stage::drifting(3).write(&folder.path().join("s.gltf"));
+    let said = run(&scene, &out, "-r 32x18 --aa 3 --progress plain").ok().err;
+    let shares = said
+        .lines()
+        .filter_map(|line| line.split_once(" % of pixels traced")?.0.rsplit(' ').next()?.parse::<f64>().ok());
+    let shares: Vec<f64> = shares.collect();
+    assert!(shares.len() == 3 && shares.iter().all(|&share| share <= 100.0), "{said}");
+}

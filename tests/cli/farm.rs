@@ -53,6 +53,19 @@ fn work_off(template: &Value, out: &Path, set: &[(&str, &str)]) {
 }
 
 #[test]
+fn a_template_is_refused_whose_tasks_would_be() {
+    let input = courtyard();
+    let plan = |options: &str| {
+        let arguments = ["plan", input.to_str().unwrap(), "--format", "openjd", "--"];
+        buzz(arguments.into_iter().chain(options.split_whitespace()))
+    };
+    plan("--report r.json").refused(2, &["--report", "own report"]);
+    plan("--aov nonsense").refused(2, &["nonsense"]);
+    plan("--stereo -1").refused(2, &["--stereo"]);
+    plan("--name x").refused(2, &["--name"]);
+}
+
+#[test]
 fn a_template_has_a_task_for_each_segment_and_one_that_follows_on_all() {
     let template = plan(&courtyard(), &format!("{SMALL} --format openjd -- --aov all"));
     assert_eq!(template["specificationVersion"], "jobtemplate-2023-09");

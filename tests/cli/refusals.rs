@@ -173,6 +173,21 @@ fn comparisons_tell_what_they_miss() {
     fs::remove_file(other.join("s.0001.exr")).unwrap();
     let missing = compare(&other, &out, "--fail-below 0");
     assert_eq!(missing.code, 1);
-    assert!(missing.err.contains("1 of the reference are not there"), "{}", missing.err);
+    assert!(missing.err.contains(": frames only in the reference: 1\n"), "{}", missing.err);
     compare(&out, &other, "--fail-below nan").refused(2, &["--fail-below"]);
+}
+
+#[test]
+fn what_is_no_number_is_not_the_same_as_black() {
+    let (folder, out) = fresh();
+    let scene = Stage::drifting(1).write(&folder.path().join("s.gltf"));
+    run(&scene, &out, "-r 16x9").ok();
+    let nan = folder.path().join("nan");
+    fs::create_dir(&nan).unwrap();
+    let color = |x: usize, y: usize| if (x, y) == (3, 2) { (f32::NAN, 0.0, 0.0) } else { (0.0, 0.0, 0.0) };
+    exr::prelude::write_rgb_file(nan.join("s.0000.exr"), 16, 9, color).unwrap();
+    for (one, other) in [(&nan, &out), (&out, &nan), (&nan, &nan)] {
+        buzz(["compare".as_ref(), one.as_os_str(), other.as_os_str()])
+            .refused(3, &["nan/s.0000.exr", "pixel 3,2", "1 pixels"]);
+    }
 }

@@ -95,3 +95,52 @@ fn what_decides_pixels_makes_them_anew() {
         assert_eq!(kept(&out), 0, "{other}");
     }
 }
+
+#[test]
+fn what_a_run_warned_of_is_in_the_report_of_the_one_that_goes_on() {
+    let (folder, out) = fresh();
+    let scene = Stage::drifting(4).write(&folder.path().join("s.gltf"));
+    let bright = |options: &str| {
+        let said = again(&scene, &out, &format!("--exposure 40 {options}")).ok().err;
+        said.matches("were not finite or too large").count()
+    };
+    // Once a run, however many frames there are.
+    assert_eq!(bright("-f 0-2"), 1);
+    assert_eq!(bright("--skip-existing"), 2);
+    let report = json(&out.join("report.json"));
+    let warnings = report["warnings"].as_array().unwrap();
+    assert!(warnings[0].as_str().unwrap().starts_with("frame 3: "), "{warnings:?}");
+    assert!(warnings[1].as_str().unwrap().starts_with("frame 0 and 2 more: "), "{warnings:?}");
+}
+
+#[test]
+fn a_report_goes_with_the_frames_that_it_is_of() {
+    let (_folder, scene, out) = rendered();
+    assert!(out.join("report.html").exists());
+    // Killed before its end, whenever that is, it leaves no report of other frames.
+    let run = crate::rig::Running::start(&scene, &out, "-r 1280x720 -q full --overwrite --progress none");
+    crate::rig::wait_for("the old report to go", || !out.join("report.json").exists());
+    run.signal("-TERM");
+    run.end();
+    assert!(!out.join("report.html").exists() || json(&out.join("report.json"))["settings"]["width"] == 1280);
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn a_name_that_is_no_text_is_known_again() {
+    use std::os::unix::ffi::OsStrExt;
+    let (folder, out) = fresh();
+    let name = std::ffi::OsStr::from_bytes(b"s\xff.gltf");
+    let scene = Stage::drifting(2).write(&folder.path().join(name));
+    again(&scene, &out, "").ok();
+    again(&scene, &out, "--skip-existing").ok();
+}
+
+#[test]
+fn a_page_of_somebody_elses_stays() {
+    let (_folder, scene, out) = rendered();
+    fs::write(out.join("index.html"), "<h1>Shot 12</h1>").unwrap();
+    let report = format!("--skip-existing --report {}", out.join("index.json").display());
+    again(&scene, &out, &report).refused(4, &["index.html", "--report"]);
+    assert_eq!(fs::read_to_string(out.join("index.html")).unwrap(), "<h1>Shot 12</h1>");
+}

@@ -130,15 +130,17 @@ impl Report {
     fn stages(&self) -> String {
         let s = &self.totals.seconds;
         let all = [
-            ("import", s.import),
-            ("accel", s.accel),
+            ("reading", s.import),
+            ("trees", s.accel),
             ("plan", s.plan),
+            ("frames on the way", s.on_the_way),
             ("infer", s.infer),
             ("trace", s.trace),
             ("enhance", s.enhance),
             ("write (beside)", s.write),
         ];
-        all.map(|(name, seconds)| format!("{name} {seconds:.2}")).join(" · ")
+        let shown = all.iter().filter(|(name, seconds)| *seconds > 0.0 || *name != "frames on the way");
+        shown.map(|(name, seconds)| format!("{name} {seconds:.2}")).collect::<Vec<_>>().join(" · ")
     }
 
     fn warned(&self) -> String {
@@ -185,7 +187,9 @@ impl Report {
                 let mut row =
                     vec![frame.id().to_string(), frame.from.map_or("key".into(), |from| from.to_string())];
                 row.extend(STACK.iter().map(|&class| grouped(count(&frame.pixels, class))));
-                row.extend([grouped(frame.rays.total()), format!("{ms:.1}")]);
+                // Of the run that made a frame which was there already there may be no report.
+                let ms = if frame.skipped && ms == 0.0 { "–".into() } else { format!("{ms:.1}") };
+                row.extend([grouped(frame.rays.total()), ms]);
                 row
             })
             .collect();

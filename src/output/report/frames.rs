@@ -161,7 +161,7 @@ impl FrameReport {
                 .get(&record.id.number)
                 .filter(|_| record.id.eye != Some(StereoEye::Right))
                 .map(|&share| millionths(share)),
-            traced: traced_share(&record.stats.pixels),
+            traced: millionths(record.stats.traced_share()),
             subpixels: record.stats.subpixels,
             rays: record.stats.rays,
             seconds: rounded(record.stats.seconds),
@@ -169,14 +169,6 @@ impl FrameReport {
             skipped: record.skipped,
         }
     }
-}
-
-/// Share of pixels for which a camera ray was cast.
-fn traced_share(pixels: &[u64; PixelClass::COUNT]) -> f64 {
-    let reused: u64 =
-        PixelClass::ALL.iter().filter(|class| class.is_reused()).map(|&c| pixels[c as usize]).sum();
-    let all: u64 = pixels.iter().sum();
-    millionths((all - reused) as f64 / all.max(1) as f64)
 }
 
 /// All classes by name, in the order of the contract: traced pixels last.
