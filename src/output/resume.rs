@@ -61,7 +61,7 @@ fn inspect(mut file: File, frame: FrameId, settings_hash: &SettingsHash) -> io::
         return Ok(Err("it was not written by this program"));
     };
     if hash != settings_hash.as_str() {
-        return Ok(Err("its input or settings were others"));
+        return Ok(Err("it was made from another input or with other settings"));
     }
     let eye = header.text(VIEW);
     if header.i32(FRAME).map(i64::from) != Some(frame.number) || eye != frame.eye.map(StereoEye::name) {
