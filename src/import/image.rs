@@ -12,7 +12,7 @@ use crate::{
     scene::{ColorSpace, Image},
 };
 use exr::meta::MetaData;
-use image::{DynamicImage, ImageFormat, ImageReader, Limits};
+use image::{DynamicImage, ImageFormat, ImageReader, Limits, RgbaImage};
 use rayon::prelude::*;
 use std::{collections::HashMap, io::Cursor, path::PathBuf};
 
@@ -269,23 +269,14 @@ fn first_line(message: &str) -> String {
 }
 
 /// A picture file of an OBJ material; the message says why it cannot be had. An error if `pictures` has no room for it.
-pub(super) fn load_file(
-    name: &str,
-    data: &[u8],
-    space: ColorSpace,
-    pictures: &Pictures,
-) -> Result<Result<Image, String>> {
+pub(super) fn decode_file(data: &[u8], pictures: &Pictures) -> Result<Result<RgbaImage, String>> {
     let mut pixels = PIXELS_FLOOR.saturating_add(data.len().saturating_mul(PIXELS_PER_BYTE));
     let count = match check_size(data, &mut pixels) {
         Ok(count) => count,
         Err(why) => return Ok(Err(why)),
     };
     pictures.take(count)?;
-    Ok(decode(data).map(|image| {
-        let image = image.into_rgba8();
-        let (width, height) = image.dimensions();
-        Image::from_rgba8(name, width, height, image.as_raw().as_chunks::<4>().0.to_vec(), space)
-    }))
+    Ok(decode(data).map(DynamicImage::into_rgba8))
 }
 
 /// The equirectangular picture of a world: `.hdr` and `.exr` are linear, the others sRGB.

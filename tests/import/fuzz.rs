@@ -304,8 +304,9 @@ fn no_bytes_of_a_picture_can_make_it_panic() {
 #[test]
 fn no_bytes_of_an_obj_can_make_it_panic() {
     let obj = "mtllib a.mtl\no A\nv 0 0 0 1 0 0\nv 1 0 0 0 1 0\nv 1 1 0 0 0 1\nv 0 1 0 1 1 1\nvt 0 0\nvt 1 1\nvn 0 0 1\n\
-               usemtl m\ns 1\nf 1/1/1 2/2/1 3/1/1 4/2/1\ng B\nf -1//-1 -2//-1 -3//-1\nf 1 2 3\nl 1 2\np 1\n";
-    let mtl = "newmtl m\nKd 1 0 0\nKs 1 1 1\nKe 0 0 1\nNs 10\nNi 1.5\nd 0.5\nillum 7\nmap_Kd -s 1 1 1 a.png\nPr 0.5\nnorm a.png\n";
+               usemtl m\ns 1\nf 1/1/1 2/2/1 3/1/1 4/2/1\ng B\nf -1//-1 -2//-1 -3//-1\nf 1 2 3\nl 1 2\np 1\nv 0 9 0\nv 1 1 0\nv 3 2 1\nf 1 5 6 2 3 4 7\n";
+    let mtl = "newmtl m\nKd 1 0 0\nKs 1 1 1\nKe 0 0 1\nNs 10\nNi 1.5\nd 0.5\nillum 7\nmap_Kd -s 1 1 1 a.png\nPr 0.5\nnorm a.png\n\
+               map_d -s 1 -o 0 0 a.png\nmap_Bump -bm 1 a.png\n";
     let folder = TempDir::new().unwrap();
     let file = folder.path().join("a.obj");
     fs::write(folder.path().join("a.png"), png(2, 2)).unwrap();

@@ -10,6 +10,7 @@ mod fuzz;
 mod geometry;
 mod gltf_file;
 mod materials;
+mod mtl;
 mod nodes;
 mod obj;
 mod read;

@@ -1,9 +1,9 @@
 //! Turntables and OBJ files. Each feature, and each way to be broken.
 
 use crate::gltf_file::{Gltf, png};
-use crate::read::{Read, features, refusal};
+use crate::read::{Read, features, read_bytes, refusal};
 use buzz::import::{ImportOptions, import};
-use buzz::scene::AlphaMode;
+use buzz::scene::{AlphaMode, Scene};
 use glam::{DVec3, Vec2, Vec3};
 use serde_json::json;
 use std::fs;
@@ -115,4 +115,94 @@ fn an_obj_reads_nothing_outside_its_folder_and_survives_what_is_missing() {
         fs::write(&file, broken).unwrap();
         refusal(import(&file, &options));
     }
+}
+
+/// The scene of an OBJ file by itself.
+fn read_obj(obj: impl AsRef<[u8]>) -> Scene {
+    let options = ImportOptions { turntable: Some(2), ..ImportOptions::default() };
+    read_bytes("a.obj", obj.as_ref(), &options).unwrap_or_else(|e| panic!("{e}"))
+}
+
+const CORNERS: &str = "v -1 -1 0\nv 1 -1 0\nv 1 1 0\nv -1 1 0\n";
+
+#[test]
+fn a_byte_order_mark_hides_nothing() {
+    let scene = read_obj(format!("\u{feff}{CORNERS}f -4 -3 -2\nf 1 2 3\n"));
+    assert_eq!(scene.triangle_count(), 2);
+    assert_eq!(scene.meshes[0].positions[0], Vec3::new(-1.0, -1.0, 0.0));
+}
+
+#[test]
+fn concave_polygons_stay_hollow() {
+    let u = [(-1., -1.), (1., -1.), (1., 1.), (0.3, 1.), (0.3, 0.), (-0.3, 0.), (-0.3, 1.), (-1., 1.)];
+    let corners: String = u.iter().map(|(x, y)| format!("v {x} {y} 0\n")).collect();
+    for first in 0..8 {
+        let face: String = (0..8).map(|i| format!(" {}", (i + first) % 8 + 1)).collect();
+        // The triangle beside it: faces of both kinds are told apart.
+        let scene = read_obj(format!("{corners}f{face}\nf 1 2 3\n"));
+        let mesh = &scene.meshes[0];
+        let area: f32 = mesh
+            .triangles
+            .iter()
+            .map(|t| {
+                let [a, b, c] = t.map(|i| mesh.positions[i as usize]);
+                let area = (b - a).cross(c - a).z / 2.0;
+                assert!(area > 0.0, "{first}");
+                area
+            })
+            .sum();
+        assert!((area - 3.4 - 2.0).abs() < 1e-5, "{first}: {area}");
+    }
+}
+
+#[test]
+fn text_of_other_times_is_read() {
+    // Latin-1 in a comment and in a name, a continued line, a tab, a polyline that is no face.
+    let latin =
+        b"# caf\xe9\no caf\xe9\nv -1 -1 0\nv 1 -1 \\\n0\nv\t1 1 0\nv 0 0 1\nf 1 2 \\\r\n 3\nl 1 2 3 4\n";
+    let scene = read_obj(latin);
+    assert_eq!((scene.triangle_count(), scene.meshes[0].name.as_str()), (1, "café"));
+    assert_eq!(features(&scene), ["lines (l)"]);
+}
+
+#[test]
+fn what_is_broken_in_an_obj_is_named_by_line() {
+    for (obj, line, what) in [
+        ("v -1,5 0 0\nv 1 -1 0\nv 1 1 0\nf 1 2 3\n", "line 1:", "`v -1,5 0 0`"),
+        ("v 0 0 0\n# c\nv 1 \\\n0\nf 1 1 1\n", "line 3:", "`v 1  0`"),
+        ("v 0 0 0\nv 1 0 0\nv 1 1 0\nvt 0\nf 1 2 3\n", "line 4:", "`vt 0`"),
+        ("v 0 0 0\nv 1 0 0\nv 1 1 0\nf 1 2 3\nf 1 2 9\n", "line 5:", "`9`"),
+        ("v 0 0 0\nv 1 0 0\nv 1 1 0\nf 1 2 3\nf 1 2 -4\n", "line 5:", "`-4`"),
+    ] {
+        let message = refusal(read_bytes("a.obj", obj.as_bytes(), &ImportOptions::default()));
+        assert!(message.contains(line) && message.contains(what), "{message}");
+    }
+}
+
+#[test]
+fn what_is_not_read_of_an_obj_is_listed_with_its_line() {
+    let scene =
+        read_obj(format!("{CORNERS}s 1\nf 1 2 3\nusemtl red\nf 1 3 4\np 1\ncurv 0 1 1 2\nsurf 0 1 0 1 1\n"));
+    let places: Vec<&str> = scene.ignored.iter().map(|i| i.place.as_str()).collect();
+    assert_eq!(
+        features(&scene),
+        [
+            "smoothing groups (s)",
+            "points (p)",
+            "curves (curv)",
+            "free-form surfaces (surf)",
+            "material red, which no library has"
+        ]
+    );
+    assert_eq!(places, ["a.obj line 6", "a.obj line 9", "a.obj line 10", "a.obj line 11", "a.obj line 7"]);
+    // With normals, or switched off, nothing is lost.
+    let scene = read_obj(format!("{CORNERS}vn 0 0 1\ns 1\nf 1//1 2//1 3//1\ns off\nf 1 3 4\n"));
+    assert_eq!(features(&scene), ["normals (vn)"]);
+}
+
+#[test]
+fn colours_of_some_vertices_only_are_left_out() {
+    let scene = read_obj("v 0 0 0 1 0 0\nv -1 -1 0\nv 1 -1 0\nv 1 1 0\nf 1 2 3\nf 2 3 4\n");
+    assert_eq!((scene.triangle_count(), scene.meshes[0].colors.len()), (2, 0));
+    assert_eq!(features(&scene), ["vertex colours"]);
 }
