@@ -186,13 +186,7 @@ fn what_is_not_read_of_an_obj_is_listed_with_its_line() {
     let places: Vec<&str> = scene.ignored.iter().map(|i| i.place.as_str()).collect();
     assert_eq!(
         features(&scene),
-        [
-            "smoothing groups (s)",
-            "points (p)",
-            "curves (curv)",
-            "free-form surfaces (surf)",
-            "material red, which no library has"
-        ]
+        ["smoothing groups (s)", "points (p)", "curves (curv)", "free-form surfaces (surf)", "material red"]
     );
     assert_eq!(places, ["a.obj line 6", "a.obj line 9", "a.obj line 10", "a.obj line 11", "a.obj line 7"]);
     // With normals, or switched off, nothing is lost.

@@ -6,7 +6,7 @@ use super::{
         ignored::Notes,
         uri::{self, Source},
     },
-    lines::{decode, shown, split, statements},
+    lines::{decode, split, statements},
 };
 use std::{
     cell::Cell,
@@ -64,8 +64,8 @@ impl Libraries<'_> {
             match line.filter(|line| tobj::load_mtl_buf(&mut line.as_bytes()).is_ok()) {
                 Some(line) => library.extend([line.as_str(), "\n"]),
                 None => {
-                    let feature = format!("{}, which cannot be read", shown(&statement));
-                    self.notes.add(feature, format!("{name} line {number}"), "it is left out");
+                    let effect = "a statement that cannot be read; it is left out";
+                    self.notes.add(key, format!("{name} line {number}"), effect);
                 }
             }
         }

@@ -84,8 +84,9 @@ pub(super) fn add(file: &Path, pictures: &Pictures, scene: &mut Scene) -> Result
             scene.instances.push(Instance { node, mesh: mesh_index, skin: None, node_from_object, object });
         }
     }
+    let of_others = scene.ignored.len();
     for entry in notes.into_entries() {
-        if !scene.ignored.contains(&entry) {
+        if !scene.ignored[..of_others].contains(&entry) {
             scene.ignored.push(entry);
         }
     }
@@ -99,8 +100,17 @@ fn place(file: &Path, what: impl Display) -> String {
 
 fn note_unknown_materials(file: &Path, survey: &Survey, materials: &[tobj::Material], notes: &Notes) {
     let known: HashSet<&str> = materials.iter().map(|material| material.name.as_str()).collect();
-    for (name, line) in survey.used.iter().filter(|(name, _)| !known.contains(name.as_str())) {
-        let feature = format!("material {name}, which no library has");
-        notes.add(feature, place(file, format_args!("line {line}")), "it is grey");
+    let mut unknown = survey.used.iter().filter(|(name, _)| !known.contains(name.as_str()));
+    if let Some((name, line)) = unknown.next() {
+        let more = match unknown.count() {
+            0 => String::new(),
+            n => format!(" and {n} more"),
+        };
+        let feature = format!("material {name}{more}");
+        notes.add(
+            feature,
+            place(file, format_args!("line {line}")),
+            "no library has it; what uses it is grey",
+        );
     }
 }
