@@ -254,7 +254,7 @@ pub enum QualityArg {
     HalfPixel,
     /// Every sample at its pixel's centre; rays at edges of surfaces and shadows.
     Centred,
-    /// Centred, and a ray proves every reused sample visible.
+    /// Centred, and every reused sample proven visible.
     Verified,
 }
 

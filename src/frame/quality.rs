@@ -10,7 +10,7 @@ pub enum Quality {
     /// Every sample at its pixel's centre: re-derived within surfaces, cast at the edges of surfaces and shadows.
     #[default]
     Centred,
-    /// As centred, and a ray proves every reused sample visible; shadow bits are borrowed only where all around agree.
+    /// As centred, and every reused sample is proven visible; shadow bits are borrowed only where all around agree.
     Verified,
 }
 
