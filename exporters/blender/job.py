@@ -170,17 +170,7 @@ class _Export:
                 self.lost.add(track.name, "object without faces", "only faces are rendered; give the curve a bevel or the edges a surface")
                 continue
             node: dict = {"name": track.name, "mesh": shape.mesh_index}
-            if motion.is_sheared(poses):
-                upper, lower = motion.split_sheared(poses)
-                parent: dict = {"name": f"{track.name} (sheared)"}
-                above = document.append("nodes", parent)
-                index = document.append("nodes", node)
-                parent["children"] = [index]
-                animation.node(parent, above, upper)
-                animation.node(node, index, lower)
-            else:
-                index = document.append("nodes", node)
-                animation.node(node, index, poses)
+            index = animation.add_node(node, poses)
             animation.visibility(node, index, shown)
             if shape.weights is not None:
                 animation.weights(index, shape.weights)

@@ -164,6 +164,21 @@ class Animation:
             samplers.append({"input": times, "output": output, "interpolation": interpolation})
         self.data["channels"].append({"sampler": index, "target": target})
 
+    def add_node(self, node: dict, poses: np.ndarray) -> int:
+        """Append a node that moves as `poses` say, below another where it is sheared; its index."""
+        if not is_sheared(poses):
+            index = self.document.append("nodes", node)
+            self.node(node, index, poses)
+            return index
+        upper, lower = split_sheared(poses)
+        parent: dict = {"name": f"{node['name']} (sheared)"}
+        above = self.document.append("nodes", parent)
+        index = self.document.append("nodes", node)
+        parent["children"] = [index]
+        self.node(parent, above, upper)
+        self.node(node, index, lower)
+        return index
+
     def node(self, node: dict, index: int, matrices: np.ndarray) -> None:
         """Give a node its transform at the first sample, and channels for what moves. `matrices` is (samples, 4, 4)."""
         moves, turns, scales = split_trs(np.array(matrices))

@@ -136,7 +136,7 @@ def test_output_folder_that_is_a_file(tmp_path):
     for output in ("file/o.gltf", "file/below/o.glb"):
         done = subprocess.run([sys.executable, str(SCRIPT), str(tmp_path / "s.usda"), str(tmp_path / output)], capture_output=True, text=True, check=False)
         assert (done.returncode, len(done.stderr.splitlines())) == (4, 1), done.stderr
-        assert "choose another output folder" in done.stderr
+        assert "choose another name or folder" in done.stderr
 
 
 @pytest.mark.parametrize("turn", [0.0, 40.0])

@@ -165,7 +165,7 @@ class _Conversion:
         materials = Materials(document, Textures(document, self.output, self.lost), self.lost, self._time(first))
         self.geometry.write(document, materials, np.array(self.taken))
         for track in self.tracks.values():
-            track.write(document, animation, self.geometry.items)
+            track.write(animation, self.geometry.items)
         for light in self.lights.values():
             light.write(document, animation, self.lost)
         for camera in self.cameras.values():

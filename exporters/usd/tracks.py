@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 
 from ..common import motion
-from ..common.document import Document
 from .shapes import Geometry
 
 _FAR = 1e5
@@ -30,7 +29,7 @@ class Track:
         self.visible.append(visible)
         self.shapes.append(shape)
 
-    def write(self, document: Document, animation: motion.Animation, items: list[Geometry]) -> None:
+    def write(self, animation: motion.Animation, items: list[Geometry]) -> None:
         """Add a node for each geometry that is seen, with its channels."""
         poses = distinct(self.poses)
         for number in dict.fromkeys(n for n in self.shapes if n is not None):
@@ -39,17 +38,7 @@ class Track:
             if not shown.any() or item.mesh is None:
                 continue
             node: dict[str, Any] = {"name": self.name, "mesh": item.mesh}
-            if motion.is_sheared(poses):
-                upper, lower = motion.split_sheared(poses)
-                parent: dict[str, Any] = {"name": f"{self.name} (sheared)"}
-                above = document.append("nodes", parent)
-                index = document.append("nodes", node)
-                parent["children"] = [index]
-                animation.node(parent, above, upper)
-                animation.node(node, index, lower)
-            else:
-                index = document.append("nodes", node)
-                animation.node(node, index, poses)
+            index = animation.add_node(node, poses)
             if item.binding is not None:
                 node.setdefault("extensions", {})["BUZZ_analytic_shape"] = item.binding
             animation.visibility(node, index, shown)
