@@ -18,7 +18,7 @@ const EDGE_ON: f32 = 1e-4;
 /// Side planes, and the one at the end.
 const PLANES: usize = 5;
 
-/// Corners of a triangle cut by that many planes, each of which adds one at most.
+/// Corners of a triangle cut by that many planes, each of which adds one at most. If rounding adds more they are left out: some are left.
 const MOST_CORNERS: usize = 3 + PLANES;
 
 /// The space between four rays from the eye, as far as a plane that cuts them, in render space.
@@ -53,20 +53,15 @@ impl Frustum {
             if normal.dot(inside) < 0.0 { -normal } else { normal }
         };
         let [a, b, c, d] = edges;
-        let cap = towards((c - a).cross(d - b), -middle);
-        let is_flat = !self.is_endless;
+        // Without an end nothing is beyond it.
+        let cap = if self.is_endless { Vec3A::ZERO } else { towards((c - a).cross(d - b), -middle) };
         // The farthest of the ends, as rounding leaves them.
         let distance = edges.iter().map(|&edge| -cap.dot(edge)).fold(0.0, f32::max);
-        let sides = [(a, b), (b, c), (c, d), (d, a)].map(|(a, b)| towards(a.cross(b), middle));
-        let [first, second, third, fourth] = sides;
-        let normals = [first, second, third, fourth, if is_flat { cap } else { Vec3A::ZERO }];
-        let reach = eye.abs().max_element()
-            + if is_flat {
-                edges.iter().fold(0.0, |reach, edge| edge.abs().max_element().max(reach))
-            } else {
-                0.0
-            };
-        Bounded { eye, normals, distances: [0.0, 0.0, 0.0, 0.0, distance], rounding: ROUNDING * reach }
+        let side = |a: Vec3A, b: Vec3A| towards(a.cross(b), middle);
+        let normals = [side(a, b), side(b, c), side(c, d), side(d, a), cap];
+        let reach = edges.iter().fold(Vec3A::ZERO, |reach, edge| reach.max(edge.abs())).max_element();
+        let rounding = ROUNDING * (eye.abs().max_element() + reach);
+        Bounded { eye, normals, distances: [0.0, 0.0, 0.0, 0.0, distance], rounding }
     }
 }
 

@@ -134,9 +134,10 @@ pub fn run(args: ConvertArgs) -> Result<ExitCode> {
         }
     }
     records.sort_by_key(|r| r.id);
-    if let [(first, _), rest @ ..] = sink.repaired().as_slice() {
+    let repaired = sink.repaired();
+    if let [(first, _), rest @ ..] = repaired.as_slice() {
         let frames = if rest.is_empty() { String::new() } else { format!(" and {} more", rest.len()) };
-        let values: u64 = sink.repaired().iter().map(|(_, values)| values).sum();
+        let values: u64 = repaired.iter().map(|(_, values)| values).sum();
         warnings.add(format!(
             "frame {first}{frames}: {values} values were not finite or too large for their channel and were replaced"
         ));

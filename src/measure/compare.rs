@@ -174,7 +174,7 @@ fn refuse_no_number(path: &Path, frame: &ReadFrame) -> Result<()> {
     let (count, width) = (frame.color.iter().filter(|pixel| is_none(pixel)).count(), frame.width);
     let place = format!("pixel {},{}", first % width, first / width);
     let message = format!(
-        "it is no number, as {count} pixels are here, and cannot be compared; render the frame again"
+        "it is no number (of the frame's pixels: {count}), and cannot be compared; render the frame again"
     );
     Err(Error::input(path, place, message))
 }
