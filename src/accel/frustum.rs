@@ -59,7 +59,9 @@ impl Frustum {
         let distance = edges.iter().map(|&edge| -cap.dot(edge)).fold(0.0, f32::max);
         let side = |a: Vec3A, b: Vec3A| towards(a.cross(b), middle);
         let normals = [side(a, b), side(b, c), side(c, d), side(d, a), cap];
-        let reach = edges.iter().fold(Vec3A::ZERO, |reach, edge| reach.max(edge.abs())).max_element();
+        // Directions have no size: a scene of any is the same.
+        let sizes: &[Vec3A] = if self.is_endless { &[] } else { &edges };
+        let reach = sizes.iter().fold(Vec3A::ZERO, |reach, edge| reach.max(edge.abs())).max_element();
         let rounding = ROUNDING * (eye.abs().max_element() + reach);
         Bounded { eye, normals, distances: [0.0, 0.0, 0.0, 0.0, distance], rounding }
     }
