@@ -174,7 +174,7 @@ pub struct OutputArgs {
     /// Render only this part: x,y,width,height in pixels of the full frame.
     #[arg(long, allow_hyphen_values = true)]
     pub crop: Option<String>,
-    /// Colour and alpha are 0 where only the world is seen.
+    /// Colour and alpha are 0 where only the world is seen, and what is blended or thin is see-through before it.
     #[arg(long)]
     pub transparent: bool,
     /// Stops applied to the colour channels.

@@ -60,7 +60,7 @@ pub struct Settings {
     pub window: Window,
     /// Layers beside the beauty.
     pub aovs: AovSet,
-    /// Colour and alpha are 0 where only the world is seen.
+    /// Colour and alpha are 0 where only the world is seen, and less than 1 where it is seen through something.
     pub transparent: bool,
     /// Stops.
     pub exposure: f32,
@@ -110,8 +110,8 @@ impl Settings {
 
     /// What of this the tracer wants to know.
     pub fn trace_options(&self) -> TraceOptions {
-        let &Self { bounces, light_samples, ambient_samples, .. } = self;
-        TraceOptions { bounces, light_samples, ambient_samples }
+        let &Self { bounces, light_samples, ambient_samples, transparent, .. } = self;
+        TraceOptions { bounces, light_samples, ambient_samples, transparent }
     }
 }
 

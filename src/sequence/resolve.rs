@@ -212,15 +212,12 @@ impl<'a> Resolver<'a> {
     ) {
         let mut radiance = Default::default();
         shader.shade_four(eye, samples, lit, counts, &mut radiance);
-        for ((pixel, sample), radiance) in pixels.iter_mut().zip(samples).zip(&radiance) {
-            *pixel = self.pixel(sample, radiance);
+        for (pixel, radiance) in pixels.iter_mut().zip(&radiance[..samples.len()]) {
+            *pixel = self.pixel(radiance);
         }
     }
 
-    fn pixel(&self, sample: &SurfaceSample, radiance: &Radiance) -> Pixel {
-        if sample.surface.is_background() && self.settings.transparent {
-            return Pixel::default();
-        }
+    fn pixel(&self, radiance: &Radiance) -> Pixel {
         let (diffuse, specular, emission) =
             (radiance.diffuse * self.gain, radiance.specular * self.gain, radiance.emission * self.gain);
         let rgb = diffuse + specular + emission;

@@ -55,11 +55,14 @@ pub struct TraceOptions {
     pub light_samples: u32,
     /// Rays to the world, where there is one; without any its light reaches everything.
     pub ambient_samples: u32,
+    /// Leaves out the world where the eye sees it, also straight through what is blended or thin; it still lights everything, and is
+    /// mirrored and refracted.
+    pub transparent: bool,
 }
 
 impl Default for TraceOptions {
     fn default() -> Self {
-        Self { bounces: 4, light_samples: 1, ambient_samples: 0 }
+        Self { bounces: 4, light_samples: 1, ambient_samples: 0, transparent: false }
     }
 }
 
@@ -72,7 +75,7 @@ pub struct Radiance {
     pub specular: Vec3,
     /// Emission, unlit colour, and the background.
     pub emission: Vec3,
-    /// Coverage: 1 on surfaces and background alike.
+    /// Coverage: 1 on surfaces and background alike, less where the world is left out.
     pub alpha: f32,
 }
 

@@ -79,6 +79,10 @@ impl<'t> Shader<'t, '_> {
             self.enhance(eye, (lanes, bits), shown, rays, radiance);
         }
         for (sample, radiance) in samples.iter().zip(radiance).filter(|(sample, _)| !is_surface(sample)) {
+            if self.tracer.options.transparent {
+                *radiance = Radiance::default();
+                continue;
+            }
             let angle = eye.pixel * f32::from(eye.perspective);
             let emission = finite(self.tracer.world.radiance(sample.position, angle));
             *radiance = Radiance { emission, alpha: 1.0, ..Radiance::default() };

@@ -35,6 +35,8 @@ pub(super) struct Path<'k> {
     /// What the first of those rays was; all that follow are counted with it.
     kind: Option<Kind>,
     beam: Beam,
+    /// Whether it has gone straight on from the eye, through what is blended or thin.
+    straight: bool,
     /// Absorption of the solid that the path is inside, 1/m.
     inside: Vec3,
     /// What is known of light at what is met.
@@ -51,13 +53,18 @@ enum Kind {
 impl<'k> Path<'k> {
     /// From the eye.
     pub fn new(beam: Beam, known: Option<&'k KnownLight<'k>>) -> Self {
-        Self { bounces: 0, share: Vec3::ONE, kind: None, beam, inside: Vec3::ZERO, known }
+        Self { bounces: 0, share: Vec3::ONE, kind: None, beam, straight: true, inside: Vec3::ZERO, known }
     }
 
-    /// On by a ray of `kind` that carries `share`.
+    /// On by a ray of `kind` that carries `share`, in another direction.
     fn next(&self, kind: Kind, share: Vec3, inside: Vec3) -> Self {
+        Self { straight: false, inside, ..self.straight_on(kind, share) }
+    }
+
+    /// On in the same direction.
+    fn straight_on(&self, kind: Kind, share: Vec3) -> Self {
         let kind = Some(self.kind.unwrap_or(kind));
-        Self { bounces: self.bounces + 1, share: self.share * share, kind, inside, ..*self }
+        Self { bounces: self.bounces + 1, share: self.share * share, kind, ..*self }
     }
 
     fn count(&self, rays: &mut RayCounts) {
@@ -67,6 +74,14 @@ impl<'k> Path<'k> {
             None => {}
         }
     }
+}
+
+/// What comes back along a ray.
+#[derive(Clone, Copy, Default)]
+struct Seen {
+    light: Vec3,
+    /// The share of it in which nothing is seen, as the world is left out.
+    open: f32,
 }
 
 /// What arrives at a point, and what of it is mirrored to the eye.
@@ -182,24 +197,26 @@ impl Tracer<'_> {
         rays: &mut RayCounts,
     ) -> Radiance {
         let coverage = self.coverage(surface, path.bounces);
-        let mut specular = incoming.highlights;
+        let (mut specular, mut open) = (incoming.highlights, 0.0);
         if surface.f90 > 0.0 || surface.eta.is_some() {
             specular += self.mirrored(it, surface, toward, incoming.openness, coverage, path, rays);
         }
         if surface.transmittance != Vec3::ZERO {
-            specular += self.transmitted(it, surface, toward, coverage, path, rays);
+            let seen = self.transmitted(it, surface, toward, coverage, path, rays);
+            (specular, open) = (specular + seen.light, seen.open);
         }
-        specular *= coverage;
+        (specular, open) = (specular * coverage, open * coverage);
         if coverage < 1.0 {
-            let share = Vec3::splat(1.0 - coverage);
-            specular +=
-                share * self.follow(it, -toward, path, path.next(Kind::Refraction, share, path.inside), rays);
+            let share = 1.0 - coverage;
+            let next = path.straight_on(Kind::Refraction, Vec3::splat(share));
+            let seen = self.follow(it, -toward, path, next, rays);
+            (specular, open) = (specular + share * seen.light, open + share * seen.open);
         }
         Radiance {
             diffuse: surface.albedo * incoming.irradiance * (FRAC_1_PI * coverage),
             specular,
             emission: surface.emission * coverage,
-            alpha: 1.0,
+            alpha: 1.0 - open,
         }
     }
 
@@ -238,7 +255,7 @@ impl Tracer<'_> {
             let share = surface.fresnel(cos) * sharp;
             if (path.share * share * coverage).max_element() > MIN_SHARE {
                 let next = path.next(Kind::Reflection, share * coverage, path.inside);
-                light += share * self.follow(it, direction, path, next, rays);
+                light += share * self.follow(it, direction, path, next, rays).light;
             }
         }
         if blurs {
@@ -258,20 +275,22 @@ impl Tracer<'_> {
         coverage: f32,
         path: &Path<'_>,
         rays: &mut RayCounts,
-    ) -> Vec3 {
+    ) -> Seen {
         let cos = it.normal.dot(toward).clamp(0.0, 1.0);
         let share = (Vec3::ONE - surface.fresnel(cos)).max(Vec3::ZERO) * surface.transmittance;
         if (path.share * share * coverage).max_element() <= MIN_SHARE {
-            return Vec3::ZERO;
+            return Seen::default();
         }
-        let (direction, inside) = match (surface.eta, it.point.material.volume) {
+        let (direction, next) = match (surface.eta, it.point.material.volume) {
             (Some(eta), Some(volume)) => {
-                let Some(direction) = refract(-toward, it.normal, eta) else { return Vec3::ZERO };
-                (direction, if it.point.front { absorption(&volume) } else { Vec3::ZERO })
+                let Some(direction) = refract(-toward, it.normal, eta) else { return Seen::default() };
+                let inside = if it.point.front { absorption(&volume) } else { Vec3::ZERO };
+                (direction, path.next(Kind::Refraction, share * coverage, inside))
             }
-            _ => (-toward, path.inside),
+            _ => (-toward, path.straight_on(Kind::Refraction, share * coverage)),
         };
-        share * self.follow(it, direction, path, path.next(Kind::Refraction, share * coverage, inside), rays)
+        let seen = self.follow(it, direction, path, next, rays);
+        Seen { light: share * seen.light, open: share.element_sum() / 3.0 * seen.open }
     }
 
     /// What comes back along `direction` from `it`: the world where the path has become too long.
@@ -282,19 +301,27 @@ impl Tracer<'_> {
         path: &Path<'_>,
         next: Path<'_>,
         rays: &mut RayCounts,
-    ) -> Vec3 {
+    ) -> Seen {
         if path.bounces >= self.options.bounces {
-            return self.world.radiance(direction, path.beam.spread);
+            return self.beyond(direction, &next);
         }
         self.trace(it.point.start(direction), direction, next, rays)
     }
 
+    /// The world, unless that is left out where the eye looks straight at it.
+    fn beyond(&self, direction: Vec3, path: &Path<'_>) -> Seen {
+        if path.straight && self.options.transparent {
+            return Seen { light: Vec3::ZERO, open: 1.0 };
+        }
+        Seen { light: self.world.radiance(direction, path.beam.spread), open: 0.0 }
+    }
+
     /// What comes along a secondary ray.
-    fn trace(&self, origin: Vec3, direction: Vec3, mut path: Path<'_>, rays: &mut RayCounts) -> Vec3 {
+    fn trace(&self, origin: Vec3, direction: Vec3, mut path: Path<'_>, rays: &mut RayCounts) -> Seen {
         path.count(rays);
         let ray = Ray { origin, direction, t_min: 0.0, t_max: f32::INFINITY };
         let Some(hit) = self.accel.intersect(self.scene, &ray, Sides::Visible) else {
-            return self.world.radiance(direction, path.beam.spread);
+            return self.beyond(direction, &path);
         };
         path.beam = path.beam.after(hit.t);
         let mut passed = Vec3::ONE;
@@ -334,7 +361,8 @@ impl Tracer<'_> {
                 }
             }
         }
-        passed * self.leaving(&it, surface, -direction, &incoming, &path, rays).total()
+        let leaving = self.leaving(&it, surface, -direction, &incoming, &path, rays);
+        Seen { light: passed * leaving.total(), open: 1.0 - leaving.alpha }
     }
 }
 

@@ -63,6 +63,37 @@ fn transparency_cuts_the_world_away_and_nothing_else() {
 }
 
 #[test]
+fn what_is_blended_is_see_through_where_only_the_world_is_behind_it() {
+    let (folder, clear) = fresh();
+    let opaque = folder.path().join("opaque");
+    let mut stage = Stage::new();
+    stage.json["materials"][1]["alphaMode"] = "BLEND".into();
+    stage.json["materials"][1]["pbrMetallicRoughness"]["baseColorFactor"][3] = 0.4.into();
+    stage.json["nodes"][0]["translation"] = serde_json::json!([0.0, 0.3, 6.0]);
+    let scene = stage.write(&folder.path().join("s.gltf"));
+    run(&scene, &opaque, "-r 96x54 --aov all -f 0 --bounces 2").ok();
+    run(&scene, &clear, "-r 96x54 --aov all -f 0 --bounces 2 --transparent").ok();
+    let (opaque, clear) = (first_frame(&opaque), first_frame(&clear));
+    let mut seen = [0; 2];
+    for (i, &alpha) in clear["A"].iter().enumerate() {
+        assert_eq!(opaque["A"][i], 1.0);
+        if opaque["depth.Z"][i] >= 1e10 {
+            assert_eq!(alpha, 0.0);
+        } else if (alpha - 0.4).abs() < 1e-3 {
+            seen[0] += 1;
+        } else {
+            assert!((alpha - 1.0).abs() < 1e-3, "{alpha}");
+            seen[1] += 1;
+        }
+        // The world is black: it is missing nowhere.
+        for channel in ["R", "G", "B"] {
+            assert!(close(clear[channel][i], opaque[channel][i]));
+        }
+    }
+    assert!(seen.iter().all(|&pixels| pixels > 50), "{seen:?}");
+}
+
+#[test]
 fn a_stop_doubles_colours_and_nothing_else() {
     let (folder, brighter) = fresh();
     let scene = Stage::drifting(2).write(&folder.path().join("s.gltf"));
