@@ -154,19 +154,31 @@ fn change(frame: &PathFrame, neighbour: &PathFrame, which: usize) -> Change {
 /// takes more than one step; taking one for a cut wrongly costs one key frame.
 const JUMP: f64 = 4.0;
 
+/// Animation on twos, threes or fours holds each pose for so many frames at most.
+const HELD: usize = 4;
+
+/// A step that is so small a share of another is held still beside it.
+const STILLNESS: f64 = 1e-3;
+
 /// First frames after a cut: those the scene names, and jumps of the camera.
 ///
 /// A jump is a step many times as long, or as far a turn, as the steps before and after it. A whip pan is none: it
-/// takes more than one step.
+/// takes more than one step. Nor is what jumps again and again, as it is animated on twos: steps in which it is held do not count. Of two
+/// frames nobody knows.
 pub fn find_cuts(path: &[PathFrame], steps: &[Step], named: &[i64]) -> Vec<i64> {
     let travel = |i: usize| (path[i + 1].view.eye - path[i].view.eye).length();
     let turn = |i: usize| path[i + 1].view.forward.angle_between(path[i].view.forward);
     let around = |i: usize, measure: &dyn Fn(usize) -> f64| {
-        let before = i.checked_sub(1).map_or(0.0, measure);
-        let after = if i + 1 < steps.len() { measure(i + 1) } else { 0.0 };
-        before.max(after)
+        let still = STILLNESS * measure(i);
+        let first = |beside: &mut dyn Iterator<Item = usize>| {
+            beside.take(HELD).map(measure).find(|&step| step > still).unwrap_or(0.0)
+        };
+        first(&mut (0..i).rev()).max(first(&mut (i + 1..steps.len())))
     };
     let is_jump = |i: usize| {
+        if steps.len() < 2 {
+            return false;
+        }
         let depth = median_depth(&path[i]);
         let leaps = travel(i) > JUMP * around(i, &travel) && travel(i) > 0.05 * depth;
         let whirls = turn(i) > JUMP * around(i, &turn) && turn(i) > 10f64.to_radians();

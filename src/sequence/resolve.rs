@@ -241,16 +241,21 @@ impl<'a> Resolver<'a> {
                 other.surfaces.as_ref().map_or(sample.position, |s| s.point(self.scene, sample.surface));
             (here.extend(1.0), there.as_dvec3().extend(1.0))
         };
-        let raster = |view: &View, p: DVec4| {
-            let r = view.raster_from_world(self.origin) * p;
-            (r.w > 0.0).then(|| (r.x / r.w, r.y / r.w))
-        };
-        match (raster(&self.shot.view, here), raster(&other.view, there)) {
-            (Some(a), Some(b)) => [(b.0 - a.0) as f32, (a.1 - b.1) as f32],
-            _ => [0.0; 2],
+        let raster = |view: &View, p: DVec4| view.raster_from_world(self.origin) * p;
+        let (a, b) = (raster(&self.shot.view, here), raster(&other.view, there));
+        // What has come behind the other eye has left the image on its way: it moves towards where it passed the near plane.
+        let near = other.view.lens.near.max(NEAREST * a.w).min(a.w);
+        let b = if b.w < near && a.w > b.w { a.lerp(b, (a.w - near) / (a.w - b.w)) } else { b };
+        if a.w > 0.0 && b.w > 0.0 {
+            [(b.x / b.w - a.x / a.w) as f32, (a.y / a.w - b.y / b.w) as f32]
+        } else {
+            [0.0; 2]
         }
     }
 }
+
+/// What comes nearer to the eye than this share of its depth is taken to have passed it.
+const NEAREST: f64 = 1e-3;
 
 /// The frame before or after, as motion needs it.
 pub(super) struct Neighbour {

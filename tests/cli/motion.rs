@@ -120,3 +120,38 @@ fn our_stage_is_inferred_whatever_moves() {
     let arguments = ["compare", out.to_str().unwrap(), full.to_str().unwrap(), "--fail-below", "40"];
     buzz(arguments).ok();
 }
+
+#[test]
+fn what_passes_the_eye_moves_out_of_the_image() {
+    let (folder, out) = fresh();
+    let mut stage = Stage::new();
+    stage.translate(CAMERA, &[[0.0, 1.0, 12.0], [0.0, 1.0, 7.0], [0.0, 1.0, 2.0], [0.0, 1.0, -3.0]]);
+    let scene = stage.write(&folder.path().join("s.gltf"));
+    run(&scene, &out, "-r 64x36 --aov motion,position -q full").ok();
+    let frame = channels(&out.join("s.0001.exr"));
+    let (mut passed, width) = (0, 64.0f32);
+    for (i, &z) in frame["P.Z"].iter().enumerate() {
+        if z > 2.0 && z < 7.0 && frame["P.Y"][i] < 0.5 {
+            let (u, v) = (frame["forward.u"][i], frame["forward.v"][i]);
+            let outward = u * (i as f32 % width - width / 2.0 + 0.5);
+            assert!(v < -10.0 && v.is_finite() && outward > 0.0, "{i}: {u} {v}");
+            passed += 1;
+        }
+    }
+    assert!(passed > 100, "{passed} pixels pass");
+}
+
+#[test]
+fn a_camera_on_twos_is_not_cut_and_one_that_jumps_is() {
+    let (folder, _) = fresh();
+    let mut stage = Stage::new();
+    // From above: to and fro on twos, then from far higher.
+    stage.json["nodes"][CAMERA]["rotation"] = serde_json::json!([-(0.5f64.sqrt()), 0.0, 0.0, 0.5f64.sqrt()]);
+    let across = |i: usize| 1.2 * [-1.0, 0.0, 1.0, 0.0][i / 2 % 4];
+    let place = |i: usize| [across(i), if i < 14 { 4.0 } else { 14.0 }, 0.0];
+    stage.translate(CAMERA, &(0..24).map(place).collect::<Vec<_>>());
+    let scene = stage.write(&folder.path().join("s.gltf"));
+    let plan = buzz(["plan".as_ref(), scene.as_os_str(), "--format".as_ref(), "json".as_ref()]).ok();
+    let plan: Value = serde_json::from_str(&plan.out).unwrap();
+    assert_eq!(plan["cuts"], serde_json::json!([14]));
+}
