@@ -58,10 +58,12 @@ impl Tally {
         }
     }
 
-    /// Share of camera and shadow rays saved, if the other frames need as many as the key frames do.
+    /// Share of camera and shadow rays saved, if the other frames need as many as the key frames do. Unknown where they plainly need
+    /// more, as where a light is out in the key frames.
     pub fn saved(&self) -> Option<f64> {
         let full = self.key_rays as f64 / self.key_frames as f64 * self.frames as f64;
-        (full > 0.0).then(|| 1.0 - self.rays.primary_and_shadow() as f64 / full)
+        let cast = self.rays.primary_and_shadow() as f64;
+        (full > 0.0 && cast <= full).then(|| 1.0 - cast / full)
     }
 }
 

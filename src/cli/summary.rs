@@ -80,7 +80,9 @@ pub fn summary(report: &Report) -> String {
         totals.traced_frames,
         totals.inferred_frames,
         wall,
-        saved.unwrap_or_else(|| "rays saved unknown: no key frame among these frames to compare with".into()),
+        saved.unwrap_or_else(|| {
+            "rays saved unknown: no key frame among these frames that stands for the others".into()
+        }),
         s.import,
         s.accel,
         s.plan,
