@@ -4,6 +4,7 @@
 use super::around::{Around, Lent, Trust, is_one_surface};
 use super::between::{self, Changed, Steps};
 use super::buzz_buffer::{BuzzBuffer, Row, UNKNOWN};
+use super::cell::growth;
 use super::centre::CastCentres;
 use super::moved::Askers;
 use super::projector::Projector;
@@ -13,15 +14,15 @@ use super::tiles::Tiles;
 use crate::frame::{PixelClass, RayCounts, SurfaceSample};
 use rayon::prelude::*;
 
-/// One pixel in so many, on either axis, is proven visible whatever is known about it.
+/// One pixel in so many, on either axis, is proven visible whatever is known about it, and asks all lights.
 ///
 /// What was too small to be sampled when it was far away would never be met, however large it grows: nothing lands on it,
 /// and all around it agree that it is not there. Here it is met sooner or later, and [followed](super::outlines) to its
 /// outline.
 const LOOKOUT: usize = 32;
 
-/// One pixel in so many where what is seen has come so much nearer that such things grow fast, or does not say: where
-/// nothing landed, and in the background.
+/// One pixel in so many where what is seen has grown so much that such things do, or does not say: where nothing landed, and in the
+/// background.
 const NEAR_LOOKOUT: usize = 16;
 
 /// One pixel in so many at the sides of the image. What comes in there before what hardly moves, or goes out, as the sky does and
@@ -32,7 +33,7 @@ const SIDE_LOOKOUT: usize = 4;
 /// the line to the eye begins in, and they say nothing.
 const BODY_LOOKOUT: usize = 4;
 
-/// The growth in a frame from which what is seen grows fast.
+/// The growth in a frame, by coming nearer or by zooming, from which what is seen grows fast.
 const FAST: f32 = 1.03;
 
 /// One pixel in so many, on either axis, has its shares confirmed.
@@ -100,6 +101,9 @@ impl<'a, R: CastCentres> Pass<'a, R> {
                 if row.object[x] == UNKNOWN {
                     let found = self.fill((x, y), row, steps, &mut memory);
                     self.see((x, y), (row, above), found, self.of_pixel(bits, x), counts);
+                } else if self.trust == Trust::Neighbours && self.looks_out((x, y), row) {
+                    // Light and shadows that were too small to be met grow as surfaces do.
+                    self.rays.confirm(self.of_pixel(bits, x).0);
                 }
                 self.ask((x, y), row, self.of_pixel(bits, x), &mut changed, counts);
             });
@@ -165,18 +169,25 @@ impl<'a, R: CastCentres> Pass<'a, R> {
         (&mut ask[columns.clone()], &mut doubt[columns])
     }
 
+    /// True where nothing around is believed, as something may have grown there that was too small to be met.
+    fn looks_out(&self, (x, y): (usize, usize), row: &Row<'_>) -> bool {
+        let has_grown =
+            |i: usize| FAST * growth(self.old, self.view, i, row.z[x]) < 1.0 || self.old.z[i].is_infinite();
+        let grows = || self.sources.of(y * self.old.width() + x).is_none_or(has_grown);
+        let has = |step: usize| self.grid.has((x, y), step);
+        self.moves && has(NEAR_LOOKOUT) && (has(LOOKOUT) || grows())
+    }
+
     /// True where what is reused is proven visible whatever is known around it.
     fn wants_proof(&self, (x, y): (usize, usize), row: &Row<'_>) -> bool {
-        let comes_near = |i: usize| self.old.z[i] > FAST * row.z[x] || self.old.z[i].is_infinite();
-        let grows = || self.sources.of(y * self.old.width() + x).is_none_or(comes_near);
-        let has = |step: usize| self.grid.has((x, y), step);
         let is_at_side = || x == 0 || y == 0 || x + 1 == self.old.width() || y + 1 == self.old.height();
-        let looks_out =
-            || has(NEAR_LOOKOUT) && (has(LOOKOUT) || grows()) || is_at_side() && self.grid.has_side((x, y));
+        let comes_in = || self.moves && is_at_side() && self.grid.has_side((x, y));
         let is_body = || self.askers.as_ref().is_some_and(|askers| askers.is_on_body(&row.sample(x)));
         match self.trust {
             Trust::Proof => !self.proven.has((x, y)),
-            Trust::Neighbours => self.moves && looks_out() || has(BODY_LOOKOUT) && is_body(),
+            Trust::Neighbours => {
+                self.looks_out((x, y), row) || comes_in() || self.grid.has((x, y), BODY_LOOKOUT) && is_body()
+            }
         }
     }
 

@@ -33,7 +33,7 @@ pub(super) fn place_before(
 }
 
 /// How many old pixels as wide as one of the view's is where the surface of old sample `i` is seen, now at depth `z`.
-fn growth(old: &BuzzBuffer, view: &Projector, i: usize, z: f32) -> f32 {
+pub(super) fn growth(old: &BuzzBuffer, view: &Projector, i: usize, z: f32) -> f32 {
     let nearer = if view.is_perspective() && z.is_finite() { z / old.z[i] } else { 1.0 };
     let growth = nearer * view.side() / old.side;
     if growth.is_finite() { growth } else { 1.0 }
