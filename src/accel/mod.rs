@@ -9,6 +9,7 @@
 //! Static scenes build their lower trees once; [`Accel::place`] then costs one small tree over the instances, and nothing
 //! at all when neither the origin nor an instance has moved.
 
+mod convex;
 mod deform;
 mod displaced;
 mod frustum;
@@ -21,6 +22,7 @@ mod shape;
 mod tree;
 mod triangle;
 mod turned;
+mod uncut;
 mod wide;
 
 use crate::frame::SurfaceRef;

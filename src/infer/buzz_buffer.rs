@@ -294,6 +294,12 @@ pub trait CastRays: Sync {
         let _ = (old, visit);
     }
 
+    /// Visits, in any order, outlines (corners in order around, metres, relative to the segment's origin) of what the near or far plane of
+    /// `old` cut off, and the view that rays are cast for sees.
+    fn uncut(&self, old: &View, visit: &(dyn Fn(&[Vec3]) + Sync)) {
+        let _ = (old, visit);
+    }
+
     /// True if the result is not wanted any more: no further row is begun. Once true, it stays true.
     fn is_cancelled(&self) -> bool {
         false

@@ -5,8 +5,8 @@
 //! depth k behind which new things may be, lies outside the old viewing volume. Pure rotations need none of this:
 //! they move every sample alike, and what comes into view finds its pixels empty.
 //!
-//! Past the paper, for samples at pixel centres, less is enough: [`at_sides`]. And what a near or far plane that moves no longer cuts off
-//! comes in anywhere: [`uncut`].
+//! Past the paper, for samples at pixel centres, less is enough: [`at_sides`]. What a near or far plane no longer cuts off comes in
+//! anywhere: see [`uncovered`](super::uncovered).
 
 use super::Marks;
 use super::buzz_buffer::BuzzBuffer;
@@ -21,9 +21,6 @@ use rayon::prelude::*;
 /// Camera moves shorter than this share of k count as pure rotations: they shift nothing by a thousandth of a pixel
 /// on an image of a thousand.
 const STILL: f64 = 1e-6;
-
-/// A near or far plane that moves by less than this share of its distance has been rounded.
-const PLANE_SLACK: f64 = 1e-6;
 
 /// Marks the contested area for new objects that are at planar depth `k` (metres) or farther.
 ///
@@ -84,28 +81,6 @@ pub(super) fn at_sides(old: &BuzzBuffer, view: &Projector, landings: &Landings, 
     for x in 0..width {
         [0, height - 1].into_iter().for_each(|y| mark(x, y));
     }
-}
-
-/// Marks the pixels that may show what the old view's near or far plane has cut off (not in the paper, whose planes stand still).
-pub(super) fn uncut(
-    old: &BuzzBuffer,
-    (old_view, new_view): (&View, &View),
-    landings: &Landings,
-    marks: &Marks,
-) {
-    let (was, is) = (old_view.lens, new_view.lens);
-    // What is nearer may stand before anything; what is farther only where nothing was seen.
-    let nearer = is.near < was.near * (1.0 - PLANE_SLACK);
-    let farther = is.far > was.far * (1.0 + PLANE_SLACK);
-    if !nearer && !farther {
-        return;
-    }
-    let is_open = |pixel: usize| landings.source(pixel).is_none_or(|i| old.surface[i].is_background());
-    (0..landings.len())
-        .into_par_iter()
-        .with_min_len(1 << 14)
-        .filter(|&pixel| nearer || is_open(pixel))
-        .for_each(|pixel| marks.set(pixel, PixelClass::Entering));
 }
 
 /// Columns `from..to` on which a value that goes evenly from `a` (first column) to `b` (last) is not negative. Slack of

@@ -48,7 +48,7 @@ mod stereo;
 mod subpixel;
 mod supersample;
 mod tiles;
-mod turned;
+mod uncovered;
 mod voxels;
 
 pub use around::{Trust, is_one_surface};
@@ -66,13 +66,13 @@ pub use seen::SeenLight;
 pub use stereo::{Parallax, in_gaps, other_eye};
 pub use subpixel::{Level, Samples, SubPixels};
 pub use supersample::Supersampling;
-pub use turned::turned;
+pub use uncovered::uncovered;
 pub use voxels::{Line, Voxels};
 
 use crate::frame::{PixelClass, RayCounts};
 use crate::scene::View;
 use creeping::forget_creeping;
-use entering::{at_sides, uncut};
+use entering::at_sides;
 use glam::DVec3;
 use moved::{moved, relight, ride};
 use rayon::prelude::*;
@@ -221,11 +221,12 @@ impl Inference {
             Move::OtherEye => other_eye(old, &Parallax::between(old_view, new_view, origin), landings, marks),
         };
 
-        // Clear what a surface that opens to the eye stands before (not in the paper, whose objects are solid).
-        rays.turned(old_view, &|triangle| turned(triangle, &to, landings, marks));
-
-        // Clear what a near or far plane that has moved no longer cuts off.
-        uncut(now, (old_view, new_view), landings, marks);
+        // Clear what a surface that opens to the eye stands before (not in the paper, whose objects are solid), and what the near or
+        // far plane no longer cuts off (nor are its scenes cut).
+        rays.turned(old_view, &|triangle| uncovered(&triangle, &to, landings, marks));
+        if by == Move::Camera {
+            rays.uncut(old_view, &|outline| uncovered(outline, &to, landings, marks));
+        }
 
         // Clear what something that moved stands before.
         if let Some(motion) = motion {

@@ -45,6 +45,10 @@ impl CastRays for Caster<'_> {
         self.tracer.turned(old, self.view, visit);
     }
 
+    fn uncut(&self, old: &View, visit: &(dyn Fn(&[Vec3]) + Sync)) {
+        self.tracer.uncut(old, self.view, visit);
+    }
+
     fn is_cancelled(&self) -> bool {
         self.observer.stop_requested().is_some()
     }

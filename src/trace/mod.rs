@@ -212,6 +212,11 @@ impl<'a> Tracer<'a> {
         self.accel.turned(self.scene, (old, new), visit);
     }
 
+    /// Visits what the near or far plane cut off in one view, and another view sees; see [`Accel::uncut`].
+    pub fn uncut(&self, old: &View, new: &View, visit: &(dyn Fn(&[Vec3]) + Sync)) {
+        self.accel.uncut(self.scene, (old, new), visit);
+    }
+
     /// The first thing on the ray through raster position (x, y): a surface's sample and the point it lies on, or the
     /// background's.
     fn first_hit(

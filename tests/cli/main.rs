@@ -19,5 +19,5 @@ mod soft;
 mod stage;
 mod stereo;
 mod trade;
-mod turned;
+mod uncovered;
 mod whole;

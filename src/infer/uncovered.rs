@@ -1,8 +1,9 @@
-//! What opens to the eye: surfaces that the old view saw edge-on, or from behind where their backs are culled.
+//! What comes out of nothing: surfaces that the old view saw edge-on, or from behind where their backs are culled, and what its near or
+//! far plane cut off.
 //!
 //! Nothing of them is among the old samples, and no line L leads to them, since no hit stood before them: a thin sheet
-//! comes out of nothing where the eye crosses its plane. The paper does not have this case; its objects are solid. So
-//! whatever lies behind such a surface on the new image is not to be believed.
+//! appears where the eye crosses its plane, a house where it comes within the far plane. The paper does not have these cases; its
+//! objects are solid, and no plane cuts them. So whatever lies behind such a surface on the new image is not to be believed.
 
 use super::Marks;
 use super::project::Landings;
@@ -10,15 +11,17 @@ use super::projector::Projector;
 use crate::frame::PixelClass;
 use glam::{DVec4, Vec3};
 
-/// Marks the pixels on which a triangle (metres, relative to the segment's origin, as samples are) stands before what landed there.
-pub fn turned(triangle: [Vec3; 3], view: &Projector, landings: &Landings, marks: &Marks) {
+/// Marks the pixels on which something flat, given by its outline's corners in order around (metres, relative to the segment's origin, as
+/// samples are), stands before what landed there.
+pub fn uncovered(outline: &[Vec3], view: &Projector, landings: &Landings, marks: &Marks) {
     // A floor may begin under the eye and end at the horizon: in single precision its near part would be lost.
     let raster_from_world = view.raster_from_world().as_dmat4();
-    let triangle = triangle.map(|p| raster_from_world * p.as_dvec3().extend(1.0));
-    let (corners, count) = before_the_eye(triangle, view.near().into(), view.is_perspective());
+    let (mut corners, count) = ([DVec4::ZERO; MOST_CORNERS], outline.len().min(MOST_CORNERS));
+    corners.iter_mut().zip(outline).for_each(|(c, p)| *c = raster_from_world * p.as_dvec3().extend(1.0));
+    let (corners, count) = before_the_eye(&corners[..count], view.near().into(), view.is_perspective());
     let corners = &corners[..count];
     let Some(nearest) = corners.iter().map(|c| c.z).reduce(f64::min) else { return };
-    let mut outline = [(0.0, 0.0); 4];
+    let mut outline = [(0.0, 0.0); MOST_CORNERS + 1];
     outline.iter_mut().zip(corners).for_each(|(place, c)| *place = (c.x / c.w, c.y / c.w));
     let (width, height) = view.size();
     for_each_centre(&outline[..count], (width.into(), height.into()), |x, y| {
@@ -30,21 +33,27 @@ pub fn turned(triangle: [Vec3; 3], view: &Projector, landings: &Landings, marks:
     });
 }
 
+/// Corners of an outline, at most: a triangle's that six planes have cut.
+const MOST_CORNERS: usize = 9;
+
 /// What is nearer to the plane of a perspective eye than this share of the farthest corner's depth is cut off with what is before
 /// the near plane: it lies far outside the image, and division by its depth would leave no digit.
 const NEAREST: f64 = 1e-9;
 
-/// The part of a triangle beyond the near plane, in homogeneous raster coordinates: so many corners.
-fn before_the_eye(triangle: [DVec4; 3], near: f64, perspective: bool) -> ([DVec4; 4], usize) {
-    let farthest = triangle.iter().map(|c| c.z).fold(0.0, f64::max);
+/// The part of an outline beyond the near plane, in homogeneous raster coordinates: so many corners.
+fn before_the_eye(outline: &[DVec4], near: f64, perspective: bool) -> ([DVec4; MOST_CORNERS + 1], usize) {
+    let farthest = outline.iter().map(|c| c.z).fold(0.0, f64::max);
     let near = if perspective { near.max(NEAREST * farthest) } else { near };
-    let (mut kept, mut count) = ([DVec4::ZERO; 4], 0);
+    let (mut kept, mut count) = ([DVec4::ZERO; MOST_CORNERS + 1], 0);
+    // Of what rounding has made less than convex some corners may be left out.
     let mut keep = |corner| {
-        kept[count] = corner;
-        count += 1;
+        if let Some(place) = kept.get_mut(count) {
+            *place = corner;
+            count += 1;
+        }
     };
-    for (i, &a) in triangle.iter().enumerate() {
-        let b = triangle[(i + 1) % 3];
+    for (i, &a) in outline.iter().enumerate() {
+        let b = outline[(i + 1) % outline.len()];
         if a.z > near {
             keep(a);
         }
@@ -119,16 +128,16 @@ mod tests {
     #[test]
     fn what_is_behind_the_eye_is_cut_off() {
         let corner = |z: f64| DVec4::new(0.0, 0.0, z, z);
-        assert_eq!(before_the_eye([corner(-1.0), corner(-2.0), corner(0.1)], 0.5, true).1, 0);
-        assert_eq!(before_the_eye([corner(1.0), corner(2.0), corner(3.0)], 0.5, true).1, 3);
-        let cut = before_the_eye([corner(-1.0), corner(2.0), corner(3.0)], 0.5, true);
+        assert_eq!(before_the_eye(&[corner(-1.0), corner(-2.0), corner(0.1)], 0.5, true).1, 0);
+        assert_eq!(before_the_eye(&[corner(1.0), corner(2.0), corner(3.0)], 0.5, true).1, 3);
+        let cut = before_the_eye(&[corner(-1.0), corner(2.0), corner(3.0)], 0.5, true);
         assert_eq!(cut.1, 4);
         assert!(cut.0.iter().all(|c| c.z >= 0.5 - 1e-6));
         // Without a near plane too.
-        let cut = before_the_eye([corner(-1.0), corner(2.0), corner(3.0)], 0.0, true);
+        let cut = before_the_eye(&[corner(-1.0), corner(2.0), corner(3.0)], 0.0, true);
         assert!(cut.0[..cut.1].iter().all(|c| c.z > 0.0));
         // Parallel rays see as much of what is near.
-        let cut = before_the_eye([corner(1e-3), corner(2e6), corner(3e6)], 0.0, false);
+        let cut = before_the_eye(&[corner(1e-3), corner(2e6), corner(3e6)], 0.0, false);
         assert_eq!(cut.1, 3);
     }
 }
