@@ -97,17 +97,21 @@ pub struct Channel {
 impl Curve {
     /// The value at `time`, in `out` (cleared first).
     ///
-    /// A key within `snap` seconds of `time` gives its own value exactly; outside the keys the nearest one holds.
+    /// A key within `snap` seconds of `time`, or as near as single precision can say, gives its own value exactly; outside
+    /// the keys the nearest one holds.
     pub fn sample_into(&self, time: f64, snap: f64, out: &mut Vec<f64>) {
         out.clear();
-        let next = self.times.partition_point(|&t| f64::from(t) <= time + snap);
+        let next = self.times.partition_point(|&t| f64::from(t) - reach(t, snap) <= time);
         let last = self.times.len() - 1;
         // `next - 1` is the last key not after the frame, `next` the first after it.
         let Some(key) = next.checked_sub(1) else {
             return self.hold(0, out);
         };
         let t0 = f64::from(self.times[key]);
-        if key == last || t0 >= time - snap || self.interpolation == Interpolation::Step {
+        if key == last
+            || t0 + reach(self.times[key], snap) >= time
+            || self.interpolation == Interpolation::Step
+        {
             return self.hold(key, out);
         }
         let duration = f64::from(self.times[key + 1]) - t0;
@@ -160,6 +164,14 @@ impl Curve {
                 + duration * (s3 - s2) * f64::from(a1[i])
         }));
     }
+}
+
+/// How far from a frame's time key `t` still counts as on it: `snap` seconds, or what rounding to single precision may
+/// have moved it by, which is more from half an hour on.
+fn reach(t: f32, snap: f64) -> f64 {
+    let step = f64::from(t.abs().next_up()) - f64::from(t.abs());
+    // A little more than half a step, since the frame's time is rounded, too.
+    snap.max(0.51 * step)
 }
 
 /// The unit quaternion of four numbers; the identity for zero.

@@ -68,7 +68,7 @@ struct Scratch {
 }
 
 impl Scene {
-    /// The scene at `time` seconds; keys within a thousandth of a frame are met exactly.
+    /// The scene at `time` seconds; keys within a thousandth of a frame, or within their own rounding, are met exactly.
     pub fn pose(&self, time: f64) -> Pose {
         let mut pose = Pose::default();
         self.pose_into(time, &mut pose);

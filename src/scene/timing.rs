@@ -50,7 +50,8 @@ impl Timing {
     /// Keys within this share of a frame from a frame's time count as being on the frame.
     ///
     /// Keys are single precision, so `frame / fps` in double precision falls just before its key on up to half of
-    /// the frames, and a STEP cut would arrive a frame late.
+    /// the frames, and a STEP cut would arrive a frame late. Late keys are coarser than this share: then what single
+    /// precision can say decides.
     pub const SNAP_FRAMES: f64 = 1e-3;
 
     /// Seconds at which `frame` stands.

@@ -45,6 +45,24 @@ fn a_step_cut_arrives_on_its_frame_at_every_rate() {
 }
 
 #[test]
+fn a_step_cut_arrives_on_its_frame_however_late_it_is() {
+    // From 2048 s on, two times of single precision are farther apart than a hundredth of a frame.
+    for start in [49_152_i32, 480_000, 2_400_000] {
+        let fps = Rational { numerator: 24000, denominator: 1001 };
+        let frames = start..start + 100;
+        let times: Vec<f32> = frames.clone().map(|f| (f64::from(f) / fps.value()) as f32).collect();
+        let values: Vec<f32> = frames.clone().flat_map(|f| [f as f32, 0.0, 0.0]).collect();
+        let mut gltf = Gltf::new();
+        gltf.animate(json!({"node": 0, "path": "translation"}), &times, "VEC3", &values, "STEP");
+        let scene = gltf.read_with(&ImportOptions { fps: Some(fps), ..ImportOptions::default() }).unwrap();
+        for frame in frames {
+            let eye = scene.view(&scene.pose(scene.timing.time_of(i64::from(frame))), 0, 4, 4).eye;
+            assert_eq!(eye.x, f64::from(frame));
+        }
+    }
+}
+
+#[test]
 fn pointers_drive_lenses_lights_and_visibility() {
     let mut gltf = Gltf::with_triangle();
     gltf.json["extensions"] = json!({"KHR_lights_punctual": {"lights": [{"type": "spot", "spot": {}}]}});
