@@ -1,6 +1,6 @@
 //! The scene at one time: where every node, light and lens is.
 
-use super::{Camera, Curve, Lens, LightKind, PosedLight, Scene, Target, View};
+use super::{Curve, Lens, LightKind, PosedLight, Scene, Target, View};
 use glam::{DAffine3, DMat3, DQuat, DVec2, DVec3, Vec3};
 
 /// A node's transform under its parent.
@@ -22,6 +22,19 @@ pub enum LocalTransform {
 impl Default for LocalTransform {
     fn default() -> Self {
         Self::Trs { translation: DVec3::ZERO, rotation: DQuat::IDENTITY, scale: DVec3::ONE }
+    }
+}
+
+impl LocalTransform {
+    /// The rotation without the scale; none of a matrix that is flat.
+    fn rotation(&self) -> DQuat {
+        match self {
+            Self::Trs { rotation, .. } => *rotation,
+            Self::Matrix(matrix) => {
+                let (_, rotation, _) = matrix.to_scale_rotation_translation();
+                if rotation.is_finite() { rotation } else { DQuat::IDENTITY }
+            }
+        }
     }
 }
 
@@ -152,13 +165,14 @@ impl Scene {
             visible[i] &= node.parent.is_none_or(|p| visible[p]);
         }
         for ((posed, light), &(color, intensity)) in lights.iter_mut().zip(&self.lights).zip(&*emitted) {
-            let world_from_light = world_from_node[light.node];
+            let axes = axes(&self.nodes, transforms, world_from_node, light.node);
             let lit = if visible[light.node] { intensity } else { 0.0 };
-            let right = world_from_light.matrix3.x_axis;
-            posed.position = world_from_light.translation;
-            posed.direction = world_from_light.transform_vector3(DVec3::NEG_Z).normalize_or(DVec3::NEG_Z);
-            posed.right =
-                right.reject_from(posed.direction).normalize_or(posed.direction.any_orthonormal_vector());
+            posed.position = world_from_node[light.node].translation;
+            posed.direction = (axes * DVec3::NEG_Z).normalize_or(DVec3::NEG_Z);
+            posed.right = axes
+                .x_axis
+                .reject_from(posed.direction)
+                .normalize_or(posed.direction.any_orthonormal_vector());
             posed.intensity = color * lit;
         }
     }
@@ -190,15 +204,15 @@ impl Scene {
     /// Position and direction come from the node; scale does not (nor does it change the lens). Right and up are
     /// made orthonormal by Gram-Schmidt, so a mirrored parent mirrors the picture.
     pub fn view(&self, pose: &Pose, camera: usize, width: u32, height: u32) -> View {
-        let Camera { node, .. } = &self.cameras[camera];
-        let world_from_camera = pose.world_from_node[*node];
-        let DMat3 { x_axis, y_axis, z_axis } = world_from_camera.matrix3;
+        let node = self.cameras[camera].node;
+        let DMat3 { x_axis, y_axis, z_axis } =
+            axes(&self.nodes, &pose.scratch.transforms, &pose.world_from_node, node);
         let forward = (-z_axis).normalize_or(DVec3::NEG_Z);
         let right = (x_axis - x_axis.project_onto(forward)).normalize_or(forward.any_orthonormal_vector());
         let up = y_axis - y_axis.project_onto(forward) - y_axis.project_onto(right);
         let up = up.normalize_or(right.cross(forward));
         View {
-            eye: world_from_camera.translation,
+            eye: pose.world_from_node[node].translation,
             right,
             up,
             forward,
@@ -208,6 +222,25 @@ impl Scene {
             pixel_aspect: self.timing.pixel_aspect,
         }
     }
+}
+
+/// The axes of a light's or camera's node in the world, of any length. Where a scale of 0 has flattened them, they are
+/// those of the rotations alone: a scale is to be ignored.
+fn axes(nodes: &[Node], transforms: &[LocalTransform], world_from_node: &[DAffine3], node: usize) -> DMat3 {
+    // Of the volume that axes of these lengths could span, so that small scales are no flat ones.
+    const FLAT: f64 = 1e-12;
+    let axes = world_from_node[node].matrix3;
+    let lengths = axes.x_axis.length() * axes.y_axis.length() * axes.z_axis.length();
+    if axes.determinant().abs() > FLAT * lengths {
+        return axes;
+    }
+    let mut rotation = DQuat::IDENTITY;
+    let mut next = Some(node);
+    while let Some(node) = next {
+        rotation = transforms[node].rotation() * rotation;
+        next = nodes[node].parent;
+    }
+    DMat3::from_quat(rotation)
 }
 
 /// Replaces what a vector holds, in the memory that it has.

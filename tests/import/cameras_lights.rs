@@ -57,6 +57,34 @@ fn lights_are_radiometric_whatever_their_parents_scale() {
 }
 
 #[test]
+fn a_scale_of_zero_turns_neither_cameras_nor_lights() {
+    let mut gltf = Gltf::new();
+    let half = std::f64::consts::FRAC_1_SQRT_2;
+    gltf.json["extensions"] = json!({"KHR_lights_punctual": {"lights": [{"type": "spot", "spot": {}}]}});
+    gltf.json["nodes"][0] = json!({"camera": 0, "rotation": [0, 0, half, half]});
+    gltf.push("nodes", json!({"extensions": {"KHR_lights_punctual": {"light": 0}}}));
+    // A quarter of a turn to the left, below it one about the axis of sight for the camera.
+    gltf.json["scenes"][0]["nodes"] = json!([2]);
+    for scale in [[1, 1, 1], [0, 0, 0], [1, 1, 0], [0, 1, 1]] {
+        let parent = json!({"rotation": [0, half, 0, half], "scale": scale, "children": [0, 1]});
+        gltf.json["nodes"].as_array_mut().unwrap().truncate(2);
+        gltf.push("nodes", parent);
+        let scene = gltf.scene();
+        let pose = scene.pose(0.0);
+        let (view, light) = (scene.view(&pose, 0, 4, 4), &pose.lights[0]);
+        for (is, wanted) in [
+            (view.forward, DVec3::NEG_X),
+            (view.right, DVec3::Y),
+            (view.up, DVec3::Z),
+            (light.direction, DVec3::NEG_X),
+            (light.right, DVec3::NEG_Z),
+        ] {
+            assert!((is - wanted).length() < 1e-9, "{scale:?}: {is} {wanted}");
+        }
+    }
+}
+
+#[test]
 fn extras_give_rate_range_size_cuts_and_world() {
     let mut gltf = Gltf::new();
     gltf.node(json!({"name": "Cam.B", "camera": 0}));
