@@ -32,7 +32,7 @@ pub(super) fn cameras(document: &Document, nodes: &Nodes, notes: &Notes) -> Resu
         let name = [node.name(), element.name()].into_iter().find(|n| !n.is_empty());
         let name = name.unwrap_or_else(|| format!("camera {}", out.items.len()));
         let lens = lens(&element, notes)?;
-        out.items.push(Camera { name, node: nodes.scene_node[i], lens });
+        out.items.push(Camera { name, node: nodes.scene_node[i], lens, elsewhere: !nodes.in_scene[i] });
         out.sources.push(source);
     }
     Ok(out)

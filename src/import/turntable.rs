@@ -72,7 +72,7 @@ pub(super) fn apply(scene: &mut Scene, frames: u32) -> Result<()> {
         near,
         far: f64::INFINITY,
     };
-    scene.cameras = vec![Camera { name: "turntable".into(), node, lens }];
+    scene.cameras = vec![Camera { name: "turntable".into(), node, lens, elsewhere: false }];
     scene.cuts.clear();
     if scene.is_dark() {
         light_up(scene);

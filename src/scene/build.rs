@@ -134,7 +134,8 @@ impl Scene {
         let node = self.add_node("", DAffine3::from_mat3_translation(axes, eye));
         let projection = Projection::Perspective { yfov };
         let lens = Lens { projection, shift: DVec2::ZERO, near: 0.0, far: f64::INFINITY };
-        self.cameras.push(Camera { name: format!("Camera{}", self.cameras.len()), node, lens });
+        let name = format!("Camera{}", self.cameras.len());
+        self.cameras.push(Camera { name, node, lens, elsewhere: false });
         self.cameras.len() - 1
     }
 }

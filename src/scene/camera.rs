@@ -12,6 +12,8 @@ pub struct Camera {
     pub node: usize,
     /// At rest.
     pub lens: Lens,
+    /// In another scene of the file only: nothing is seen through it unless it is asked for.
+    pub elsewhere: bool,
 }
 
 /// How a camera maps directions to the image.

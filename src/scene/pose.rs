@@ -178,7 +178,7 @@ impl Scene {
     }
 
     /// The camera that frame `frame` is seen through: `chosen` if given, else the scene's cuts, else the first
-    /// animated camera, else the first.
+    /// animated camera, else the first. Cameras of other scenes come after all of the scene's own.
     ///
     /// Before the first cut its camera is used already, as Blender does with markers.
     pub fn camera_at(&self, frame: i64, chosen: Option<usize>) -> usize {
@@ -186,17 +186,19 @@ impl Scene {
             let last = self.cuts.iter().rev().find(|c| c.frame <= frame);
             last.or(self.cuts.first()).map(|c| c.camera)
         };
-        chosen.or_else(by_cut).or_else(|| self.first_animated_camera()).unwrap_or(0)
+        chosen.or_else(by_cut).unwrap_or_else(|| self.default_camera())
     }
 
-    fn first_animated_camera(&self) -> Option<usize> {
+    fn default_camera(&self) -> usize {
         let moved = self.moved_nodes();
         let zooms = |camera: usize| {
             self.channels.iter().any(|c| {
                 matches!(c.target, Target::CameraYfov(i) | Target::CameraXmag(i) | Target::CameraYmag(i) if i == camera)
             })
         };
-        (0..self.cameras.len()).find(|&c| moved[self.cameras[c].node] || zooms(c))
+        let is_still = |c: usize| !(moved[self.cameras[c].node] || zooms(c));
+        // The first of several that are alike.
+        (0..self.cameras.len()).min_by_key(|&c| (self.cameras[c].elsewhere, is_still(c))).unwrap_or(0)
     }
 
     /// What camera number `camera` sees in `pose`, on an image of `width` x `height` pixels.

@@ -61,6 +61,32 @@ fn cameras_of_other_scenes_count_and_their_meshes_do_not() {
 }
 
 #[test]
+fn a_camera_of_another_scene_is_the_last_choice() {
+    let mut gltf = Gltf::with_triangle();
+    gltf.json["nodes"] = json!([
+        {"name": "other", "camera": 0, "translation": [0, 0, 9]},
+        {"mesh": 0},
+        {"name": "still", "camera": 0},
+        {"name": "moved", "camera": 0},
+    ]);
+    gltf.json["scenes"] = json!([{"nodes": [1, 2, 3]}, {"nodes": [0]}]);
+    let seen_through = |gltf: &Gltf| {
+        let scene = gltf.scene();
+        scene.cameras[scene.camera_at(0, None)].name.clone()
+    };
+    assert_eq!(seen_through(&gltf), "still");
+    for (node, seen) in [(0, "still"), (3, "moved")] {
+        gltf.animate(json!({"node": node, "path": "translation"}), &[0.0, 1.0], "VEC3", &[1.0; 6], "LINEAR");
+        assert_eq!(seen_through(&gltf), seen);
+    }
+    // It is there to be asked for, and where there is no other.
+    assert_eq!(gltf.scene().cameras.len(), 3);
+    assert_eq!(gltf.scene().camera_at(0, Some(0)), 0);
+    gltf.json["scenes"][0]["nodes"] = json!([1]);
+    assert_eq!(seen_through(&gltf), "other");
+}
+
+#[test]
 fn hidden_nodes_hide_what_is_below_them() {
     let mut gltf = Gltf::with_triangle();
     gltf.json["nodes"][1]["extensions"] = json!({"KHR_node_visibility": {"visible": false}});
