@@ -2,11 +2,7 @@
 
 use super::document::{Document, Element};
 use crate::{Error, Result, scene::Ignored};
-use std::{
-    cell::RefCell,
-    collections::{HashMap, HashSet},
-    path::Path,
-};
+use std::{cell::RefCell, collections::HashSet, path::Path};
 
 /// Extensions that are read. Everything else in `extensionsRequired` is refused.
 const READ: &[&str] = &[
@@ -94,34 +90,53 @@ pub(super) fn check_extensions(document: &Document, notes: &Notes) -> Result<()>
             return Err(item.error(format!("the file requires {name}, which is not supported; {advice}")));
         }
     }
-    let mut places = first_uses(document)?;
+    let met = first_uses(document)?;
+    let mut listed = HashSet::new();
     for item in document.root().items("extensionsUsed")? {
         let Some(name) = item.value.as_str() else { continue };
-        if READ.contains(&name) {
-            continue;
-        }
-        let known = NOT_RENDERED.iter().find(|(known, _)| *known == name);
-        let effect = known.map_or("unknown; left out", |(_, effect)| effect);
-        notes.add(name, places.remove(name).unwrap_or(item.place), effect);
+        let place = met.iter().find(|(met, _)| *met == name).map(|(_, place)| place.clone());
+        note_unless_read(name, place.unwrap_or(item.place), notes);
+        listed.insert(name);
+    }
+    // Some tools forget to declare what they write.
+    for (name, place) in met.into_iter().filter(|(name, _)| !listed.contains(name)) {
+        note_unless_read(name, place, notes);
     }
     Ok(())
 }
 
-/// Where each extension is first used: the pointer that helps to find it in the authoring tool.
-fn first_uses(document: &Document) -> Result<HashMap<&str, String>> {
-    let mut places = HashMap::new();
-    for array in ["materials", "nodes", "textures", "images", "cameras"] {
+fn note_unless_read(name: &str, place: String, notes: &Notes) {
+    if !READ.contains(&name) {
+        let known = NOT_RENDERED.iter().find(|(known, _)| *known == name);
+        notes.add(name, place, known.map_or("unknown; left out", |(_, effect)| effect));
+    }
+}
+
+/// Each extension that is used, once, and where first: the pointer that helps to find it in the authoring tool.
+fn first_uses<'a>(document: &'a Document) -> Result<Vec<(&'a str, String)>> {
+    let (mut met, mut known) = (Vec::new(), HashSet::new());
+    let mut meet = |name: &'a str, place: &str| {
+        if known.insert(name) {
+            met.push((name, place.to_owned()));
+        }
+    };
+    for array in ["materials", "nodes", "textures", "images", "cameras", "scenes"] {
         for element in document.elements(array)? {
-            let Some(extensions) = element.get("extensions") else { continue };
-            for (name, _) in extensions.members() {
-                places.entry(name).or_insert_with(|| element.place.clone());
-            }
+            extensions(&element).for_each(|(name, _)| meet(name, &element.place));
         }
     }
-    for (name, element) in document.root().get("extensions").iter().flat_map(Element::members) {
-        places.entry(name).or_insert(element.place);
+    for mesh in document.elements("meshes")? {
+        for primitive in mesh.items("primitives")? {
+            extensions(&primitive).for_each(|(name, _)| meet(name, &primitive.place));
+        }
     }
-    Ok(places)
+    extensions(&document.root()).for_each(|(name, element)| meet(name, &element.place));
+    Ok(met)
+}
+
+/// The extensions of an element.
+fn extensions<'a>(element: &Element<'a>) -> impl Iterator<Item = (&'a str, Element<'a>)> + use<'a> {
+    element.get("extensions").into_iter().flat_map(|extensions| extensions.members())
 }
 
 /// With `--strict`, anything left out is an error.

@@ -165,3 +165,28 @@ fn used_extensions_that_are_not_rendered_are_listed_once_and_refused_if_strict()
     assert!(message.contains("KHR_materials_clearcoat") && message.contains("1 more"), "{message}");
     assert!(Gltf::with_triangle().read_with(&strict).is_ok());
 }
+
+#[test]
+fn extensions_that_the_file_forgets_to_declare_are_listed_after_those_that_it_declares() {
+    let mut gltf = Gltf::with_triangle();
+    gltf.json["extensionsUsed"] = json!(["ACME_x"]);
+    gltf.push(
+        "materials",
+        json!({"extensions": {"KHR_materials_clearcoat": {"clearcoatFactor": 1}, "KHR_materials_unlit": {}}}),
+    );
+    gltf.json["nodes"][1]["extensions"] = json!({"ACME_y": {}});
+    gltf.json["meshes"][0]["primitives"][0]["extensions"] =
+        json!({"KHR_materials_variants": {"mappings": []}});
+    let scene = gltf.scene();
+    let listed: Vec<(&str, &str)> =
+        scene.ignored.iter().map(|i| (i.feature.as_str(), i.place.as_str())).collect();
+    let wanted = [
+        ("ACME_x", "/extensionsUsed/0"),
+        ("KHR_materials_clearcoat", "/materials/0"),
+        ("ACME_y", "/nodes/1"),
+        ("KHR_materials_variants", "/meshes/0/primitives/0"),
+    ];
+    assert_eq!(listed, wanted);
+    let strict = ImportOptions { strict: true, ..ImportOptions::default() };
+    assert!(refusal(gltf.read_with(&strict)).contains("ACME_x"));
+}
