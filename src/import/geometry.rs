@@ -7,11 +7,14 @@ use super::{
     primitive,
 };
 use crate::{
-    Result,
+    Error, Result,
     scene::{Mesh, MorphTarget},
 };
 use glam::{Vec2, Vec3, Vec4};
 use std::{collections::HashMap, rc::Rc};
+
+/// Compressed meshes; read only where the same mesh stands beside it as it is.
+const DRACO: &str = "KHR_draco_mesh_compression";
 
 /// Reads primitives; arrays that several primitives share are decoded once.
 pub(super) struct Geometry<'a> {
@@ -78,16 +81,23 @@ impl<'a> Geometry<'a> {
         let Some(mode) = primitive::mode(element, self.notes)? else { return Ok(None) };
         let attributes = element.get("attributes");
         let Some(position) = attributes.as_ref().and_then(|a| a.get("POSITION")) else {
-            if element.extension("KHR_draco_mesh_compression").is_some() {
-                let message = "KHR_draco_mesh_compression is not supported; export without Draco compression";
-                return Err(element.error(message));
+            if element.extension(DRACO).is_some() {
+                return Err(draco_alone(element));
             }
             self.notes.add("primitive without POSITION", &element.place, "nothing is drawn for it");
             return Ok(None);
         };
+        let indices = element.get("indices");
+        if element.extension(DRACO).is_some() {
+            for user in [Some(&position), indices.as_ref()].into_iter().flatten() {
+                if !self.has_data(user)? {
+                    return Err(draco_alone(element));
+                }
+            }
+        }
         let positions = self.decode(&position, &[3], Integers::AsDeclared)?;
         let count = positions.values.len() / 3;
-        let indices = match element.get("indices") {
+        let indices = match indices {
             None => None,
             Some(e) => Some(self.accessors.whole_numbers(e.as_index()?, &e.place, 1)?),
         };
@@ -252,6 +262,12 @@ impl<'a> Geometry<'a> {
         Ok(decoded)
     }
 
+    /// Whether an accessor has data of its own: one without is all zeros, which stand for what Draco holds.
+    fn has_data(&self, user: &Element) -> Result<bool> {
+        let accessor = self.accessors.document.element("accessors", user.as_index()?, &user.place)?;
+        Ok(accessor.get("bufferView").or_else(|| accessor.get("sparse")).is_some())
+    }
+
     fn pick(&self, decoded: &Decoded, picked: &Picked, user: &Element) -> Result<Vec<f32>> {
         let Decoded { values, width } = decoded;
         self.check_count(values.len() / width, user, picked)?;
@@ -271,6 +287,10 @@ impl<'a> Geometry<'a> {
         }
         Err(user.error(format!("has {count} elements for {} vertices; export the file again", picked.count)))
     }
+}
+
+fn draco_alone(primitive: &Element) -> Error {
+    primitive.error(format!("{DRACO} is not supported; export without Draco compression"))
 }
 
 fn put<T: Clone>(sets: &mut Vec<Vec<T>>, set: usize, values: Vec<T>) {

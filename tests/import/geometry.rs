@@ -270,3 +270,21 @@ fn meshopt_views_are_decompressed_and_lies_about_their_size_refused() {
         assert!(broken.refused().contains(&extension), "{key}");
     }
 }
+
+#[test]
+fn draco_without_the_mesh_beside_it_is_refused() {
+    let mut gltf = Gltf::with_triangle();
+    let indices = gltf.accessor("SCALAR", 5121, 3, &[0, 1, 2]);
+    let primitive = &mut gltf.json["meshes"][0]["primitives"][0];
+    primitive["indices"] = json!(indices);
+    primitive["extensions"] = json!({"KHR_draco_mesh_compression": {"bufferView": 0, "attributes": {}}});
+    gltf.json["extensionsUsed"] = json!(["KHR_draco_mesh_compression"]);
+    let scene = gltf.scene();
+    assert_eq!((scene.triangle_count(), features(&scene)), (1, vec!["KHR_draco_mesh_compression"]));
+    for accessor in [0, indices] {
+        let mut alone = Gltf { json: gltf.json.clone(), bytes: gltf.bytes.clone() };
+        alone.json["accessors"][accessor].as_object_mut().unwrap().remove("bufferView");
+        let message = alone.refused();
+        assert!(message.contains("/meshes/0/primitives/0: KHR_draco_mesh_compression"), "{message}");
+    }
+}
