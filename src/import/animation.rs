@@ -202,7 +202,8 @@ fn curve(
     let widths = if weights { &[1][..] } else { &[aim.width] };
     let values = accessors.numbers(sampler.required_index("output")?, &place, widths, integers)?.values;
     let each = aim.width * if interpolation == Interpolation::CubicSpline { 3 } else { 1 };
-    if values.len() / each < times.len() {
+    // Nor more: which of them belong to which key is anyone's guess.
+    if values.len() != times.len().saturating_mul(each) {
         let message =
             format!("{} values for {} keys of {each} each; export the file again", values.len(), times.len());
         return Err(accessors.document.error(place, message));

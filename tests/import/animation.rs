@@ -237,6 +237,15 @@ fn broken_animations_are_refused_by_their_pointer() {
     let mut gltf = Gltf::new();
     gltf.animate(json!({"node": 0, "path": "translation"}), &[0.0, 1.0], "VEC3", &[0.0; 6], "CUBICSPLINE");
     assert!(gltf.refused().contains("values for 2 keys"));
+    let mut gltf = Gltf::new();
+    gltf.animate(json!({"node": 0, "path": "translation"}), &[0.0, 1.0], "VEC3", &[0.0; 9], "LINEAR");
+    assert!(gltf.refused().contains("9 values for 2 keys"));
+    // Three weights a key, where the mesh has two.
+    let mut gltf = Gltf::with_triangle();
+    let target = gltf.floats("VEC3", &[0.0; 9]);
+    gltf.json["meshes"][0]["primitives"][0]["targets"] = json!([{"POSITION": target}, {"POSITION": target}]);
+    gltf.animate(json!({"node": 1, "path": "weights"}), &[0.0, 1.0], "SCALAR", &[0.0; 6], "LINEAR");
+    assert!(gltf.refused().contains("6 values for 2 keys of 2 each"));
 }
 
 #[test]
