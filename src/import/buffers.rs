@@ -2,7 +2,7 @@
 
 use super::{
     budget::Budget,
-    document::{Document, Element, read_file},
+    document::{Document, Element},
     meshopt,
     uri::{self, Source},
 };
@@ -131,7 +131,7 @@ fn load(
             Source::File(path) => match files.get(&path) {
                 Some(bytes) => bytes.clone(),
                 None => {
-                    let bytes = Rc::new(read_file(&path)?);
+                    let bytes = Rc::new(document.read_named(&path, &buffer.place)?);
                     files.insert(path, bytes.clone());
                     bytes
                 }

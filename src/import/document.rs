@@ -69,6 +69,11 @@ impl Document {
         Error::input(&self.file, if place.is_empty() { "/".to_owned() } else { place }, message)
     }
 
+    /// Reads a file that the element at `place` names.
+    pub fn read_named(&self, path: &Path, place: &str) -> Result<Vec<u8>> {
+        read_regular(path).map_err(|why| self.error(place, format!("{} {why}", path.display())))
+    }
+
     /// Number of elements in a top-level array; 0 where there is none.
     pub fn count(&self, array: &str) -> usize {
         self.root.get(array).and_then(Value::as_array).map_or(0, Vec::len)
@@ -233,9 +238,14 @@ impl<'a> Element<'a> {
 
 /// Reads a regular file; a pipe or device could be endless.
 pub(super) fn read_file(file: &Path) -> Result<Vec<u8>> {
-    let failed = |e: std::io::Error| Error::input(file, "file", format!("cannot be read ({e})"));
+    read_regular(file).map_err(|why| Error::input(file, "file", why))
+}
+
+/// The bytes of a regular file, or what is wrong with it.
+fn read_regular(file: &Path) -> Result<Vec<u8>, String> {
+    let failed = |e: std::io::Error| format!("cannot be read ({e})");
     if !fs::metadata(file).map_err(failed)?.is_file() {
-        return Err(Error::input(file, "file", "is not a regular file"));
+        return Err("is not a regular file".into());
     }
     fs::read(file).map_err(failed)
 }

@@ -204,7 +204,9 @@ fn encoded_bytes(
             }
         }));
     }
-    let Some(text) = element.text("uri")? else { return Ok(Err("without uri and bufferView".into())) };
+    let Some(text) = element.text("uri")?.filter(|text| !text.is_empty()) else {
+        return Ok(Err("without uri and bufferView".into()));
+    };
     Ok(match uri::resolve(document, text, &element.place)? {
         Source::Data(bytes) => Ok(Found::Bytes(bytes, None)),
         Source::Missing(_) => Err(format!("{text} is missing")),
@@ -283,11 +285,7 @@ pub(super) fn decode_file(data: &[u8], pictures: &Pictures) -> Result<Result<Rgb
 ///
 /// The artist asked for this picture by name: without it all light would be wrong, so it is an error if missing.
 pub(super) fn load_world(document: &Document, uri: &str, place: &str, pictures: &Pictures) -> Result<Image> {
-    let data = match uri::resolve(document, uri, place)? {
-        Source::Data(bytes) => bytes,
-        Source::File(path) => read_file(&path)?,
-        missing @ Source::Missing(_) => missing.read(document, place)?,
-    };
+    let data = uri::resolve(document, uri, place)?.read(document, place)?;
     let mut pixels = PIXELS_FLOOR.saturating_add(data.len().saturating_mul(PIXELS_PER_BYTE));
     let broken =
         |why: String| document.error(place, format!("the image cannot be read ({why}); save it again"));

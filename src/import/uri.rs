@@ -1,6 +1,6 @@
 //! URIs of buffers and images: data, or a file in the document's own folder.
 
-use super::document::{Document, read_file};
+use super::document::Document;
 use crate::{Error, Result};
 use base64::{
     Engine,
@@ -36,7 +36,7 @@ impl Source {
     pub fn read(self, document: &Document, place: &str) -> Result<Vec<u8>> {
         match self {
             Self::Data(bytes) => Ok(bytes),
-            Self::File(path) => read_file(&path),
+            Self::File(path) => document.read_named(&path, place),
             Self::Missing(path) => {
                 let message = format!("{} is missing; put it beside the file", path.display());
                 Err(document.error(place, message))
@@ -49,6 +49,9 @@ impl Source {
 pub(super) fn resolve(document: &Document, uri: &str, place: &str) -> Result<Source> {
     if uri.get(..5).is_some_and(|scheme| scheme.eq_ignore_ascii_case("data:")) {
         return data(document, &uri[5..], place).map(Source::Data);
+    }
+    if uri.is_empty() {
+        return Err(document.error(place, "the URI is empty; export the file again"));
     }
     let path = percent_decode_str(uri)
         .decode_utf8()

@@ -100,6 +100,30 @@ fn a_missing_buffer_is_an_error_and_a_missing_picture_is_not() {
     assert!(gltf.refused().contains("gone.bin is missing"));
 }
 
+#[test]
+fn names_that_lead_to_no_file_are_refused_by_who_has_them() {
+    let folder = TempDir::new().unwrap();
+    let file = folder.path().join("scene.gltf");
+    fs::create_dir(folder.path().join("sub")).unwrap();
+    let refused = |gltf: &Gltf| {
+        fs::write(&file, gltf.text()).unwrap();
+        refusal(import(&file, &ImportOptions::default()))
+    };
+    for (uri, why) in
+        [("", "the URI is empty"), ("sub", "sub is not a regular file"), (".", "is not a regular file")]
+    {
+        let mut gltf = Gltf::with_triangle();
+        gltf.json["buffers"] = json!([{"byteLength": 36, "uri": uri}]);
+        let message = refused(&gltf);
+        assert!(message.contains("scene.gltf: /buffers/0: ") && message.contains(why), "{message}");
+        let mut gltf = Gltf::with_triangle();
+        gltf.json["scenes"][0]["extras"] = json!({"buzz": {"world": {"image": uri}}});
+        let message = refused(&gltf);
+        assert!(message.contains("world/image: ") && message.contains(why), "{message}");
+    }
+    assert_eq!(features(&textured("").scene()), ["image without uri and bufferView"]);
+}
+
 #[cfg(unix)]
 #[test]
 fn a_folder_or_device_is_not_a_scene() {
