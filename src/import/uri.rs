@@ -56,20 +56,35 @@ pub(super) fn resolve(document: &Document, uri: &str, place: &str) -> Result<Sou
     let path = percent_decode_str(uri)
         .decode_utf8()
         .map_err(|_| document.error(place, "the URI is not UTF-8 after percent-decoding"))?;
-    in_folder(&document.folder, &path).map_err(|why| document.error(place, why))
+    // A colon that is encoded is part of a name.
+    let source = if has_scheme(uri) { Err(refusal(uri, SCHEME)) } else { below(&document.folder, &path) };
+    source.map_err(|why| document.error(place, why))
 }
 
 /// The file `path` in `folder` or below, or why it will not be read. `folder` is canonical.
 pub(super) fn in_folder(folder: &Path, path: &str) -> Result<Source, String> {
+    if has_scheme(path) { Err(refusal(path, SCHEME)) } else { below(folder, path) }
+}
+
+/// What is wrong with a name that [`has_scheme`].
+const SCHEME: &str = "has a scheme";
+
+/// Says why `path` will not be read.
+fn refusal(path: &str, why: &str) -> String {
+    format!("`{path}` {why}; only files in the scene's own folder are read")
+}
+
+/// Whether a text begins as a URI does that is not relative, or as a path does that names a drive.
+fn has_scheme(text: &str) -> bool {
+    let scheme = text.split_once(':').map_or("", |(scheme, _)| scheme);
+    !scheme.is_empty() && scheme.chars().all(|c| c.is_ascii_alphanumeric() || "+-.".contains(c))
+}
+
+/// [`in_folder`] for a path that may have colons.
+fn below(folder: &Path, path: &str) -> Result<Source, String> {
     // Windows tools write back-slashes; on other systems they would be part of the name.
     let path = path.replace('\\', "/");
-    let refuse = |why: &str| Err(format!("`{path}` {why}; only files in the scene's own folder are read"));
-    let scheme = path.split_once(':').map(|(scheme, _)| scheme);
-    if scheme
-        .is_some_and(|s| !s.is_empty() && s.chars().all(|c| c.is_ascii_alphanumeric() || "+-.".contains(c)))
-    {
-        return refuse("has a scheme");
-    }
+    let refuse = |why: &str| Err(refusal(&path, why));
     let mut depth = 0_i32;
     for component in Path::new(&path).components() {
         match component {

@@ -58,6 +58,18 @@ fn files_beside_the_scene_are_found_by_their_percent_encoded_names() {
     }
 }
 
+#[cfg(unix)]
+#[test]
+fn a_colon_that_is_encoded_is_part_of_the_name() {
+    let folder = TempDir::new().unwrap();
+    let mut gltf = Gltf::with_triangle();
+    fs::write(folder.path().join("take:2.bin"), &gltf.bytes).unwrap();
+    gltf.json["buffers"] = json!([{"byteLength": gltf.bytes.len(), "uri": "take%3A2.bin"}]);
+    let file = folder.path().join("scene.gltf");
+    fs::write(&file, gltf.text()).unwrap();
+    assert_eq!(import(&file, &ImportOptions::default()).unwrap().triangle_count(), 1);
+}
+
 #[test]
 fn nothing_outside_the_scenes_folder_is_read() {
     let outer = TempDir::new().unwrap();
@@ -78,6 +90,7 @@ fn nothing_outside_the_scenes_folder_is_read() {
         (file_url.as_str(), "has a scheme"),
         ("http://localhost/secret.bin", "has a scheme"),
         ("C:\\secret.bin", "has a scheme"),
+        ("https%3A//../../secret.bin", "leaves the folder"),
         #[cfg(unix)]
         ("link.bin", "is a link that leaves the folder"),
     ] {
