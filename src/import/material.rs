@@ -122,20 +122,14 @@ pub(super) fn read(element: &Element, images: &Images, notes: &Notes) -> Result<
     if let Some(extension) = element.extension(SPECULAR_GLOSSINESS) {
         // The same reflectance as a dielectric with a coloured specular; only the glossiness texture has no place.
         let specular = Vec3::from(extension.f32s("specularFactor", [1.0; 3])?).clamp(Vec3::ZERO, Vec3::ONE);
-        let textured = extension.get("specularGlossinessTexture").is_some();
-        // What is mirrored is not scattered: c_diff = diffuse (1 - max(specular)).
-        let scattered = if textured { 1.0 } else { 1.0 - specular.max_element() };
-        let diffuse = Vec4::from(extension.f32s("diffuseFactor", [1.0; 4])?).max(Vec4::ZERO);
-        out.base_color = (diffuse.truncate() * scattered).extend(diffuse.w);
+        out.base_color = Vec4::from(extension.f32s("diffuseFactor", [1.0; 4])?).max(Vec4::ZERO);
         out.base_color_texture = texture(&extension, "diffuseTexture", ColorSpace::Srgb)?;
         (out.metallic, out.metallic_roughness_texture) = (0.0, None);
         out.roughness = 1.0 - extension.f32("glossinessFactor", 1.0)?.clamp(0.0, 1.0);
         out.specular_color = specular / F0;
         out.specular_color_texture = texture(&extension, "specularGlossinessTexture", ColorSpace::Srgb)?;
-        if textured {
-            let effect =
-                "glossiness in textures is left out, and diffuse is as bright as without its specular";
-            notes.add(SPECULAR_GLOSSINESS, element.place.clone(), effect);
+        if extension.get("specularGlossinessTexture").is_some() {
+            notes.add(SPECULAR_GLOSSINESS, element.place.clone(), "glossiness in textures is left out");
         }
     }
     Ok(out)

@@ -11,6 +11,12 @@ const FULL_MIRROR_ROUGHNESS: f32 = 0.1;
 /// Highlights are no sharper than this roughness, so that lights without size have some that are finite.
 const MIN_HIGHLIGHT_ROUGHNESS: f32 = 0.08;
 
+/// Reflectance at normal incidence of the usual index of refraction, 1.5.
+const USUAL_REFLECTANCE: f32 = {
+    let root: f32 = (1.5 - 1.0) / (1.5 + 1.0);
+    root * root
+};
+
 /// A material's parameters at a point.
 #[derive(Debug, Clone)]
 pub(super) struct Surface {
@@ -114,7 +120,7 @@ impl Surface {
         let ior = material.ior.max(1.0);
         let bends = material.volume.is_some() && transmission > 0.0 && metallic < 1.0;
         Self {
-            albedo: color * ((1.0 - metallic) * (1.0 - transmission)),
+            albedo: color * ((1.0 - metallic) * (1.0 - transmission) * scattered(dielectric_f0)),
             emission,
             coverage,
             roughness,
@@ -151,6 +157,12 @@ impl Surface {
     }
 }
 
+/// Share of the light that a dielectric scatters of what it would with the usual reflectance: what is mirrored is not
+/// scattered. It does not depend on the eye, as the Fresnel term does, and colours are chosen with the usual one in mind.
+fn scattered(f0: Vec3) -> f32 {
+    ((1.0 - f0.max_element()) / (1.0 - USUAL_REFLECTANCE)).min(1.0)
+}
+
 /// Share of the reflection that is a mirror image.
 fn mirror(roughness: f32) -> f32 {
     let t = (MIRROR_ROUGHNESS - roughness) / (MIRROR_ROUGHNESS - FULL_MIRROR_ROUGHNESS);
@@ -164,4 +176,57 @@ pub(super) fn occlusion(it: &SurfaceInteraction) -> f32 {
     occlusion_texture
         .as_ref()
         .map_or(1.0, |(texture, strength)| 1.0 + strength * (it.texture(texture).x - 1.0))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::Wrap;
+    use glam::Affine2;
+
+    fn albedo(material: &Material, texture: Vec4) -> Vec3 {
+        Surface::new(material, true, Vec4::ONE, |_| texture).albedo
+    }
+
+    #[test]
+    fn what_is_mirrored_is_not_scattered() {
+        let color = Vec3::new(0.9, 0.5, 0.1);
+        let with = |ior: f32, specular_color: Vec3| Material {
+            ior,
+            specular_color,
+            ..Material::dielectric(color, 0.5)
+        };
+        // The usual reflectance and less change nothing, to the bit.
+        for material in [with(1.5, Vec3::ONE), with(1.0, Vec3::ONE), with(1.5, Vec3::splat(0.5))] {
+            assert_eq!(albedo(&material, Vec4::ONE), color);
+        }
+        // All light is mirrored, or half of it in the channel that has the most.
+        assert!(albedo(&with(1e6, Vec3::ONE), Vec4::ONE).max_element() < 1e-5);
+        let half = albedo(&with(1e6, Vec3::new(0.1, 0.5, 0.2)), Vec4::ONE);
+        assert!((half - color * (0.5 / 0.96)).length() < 1e-4, "{half}");
+        // The same reflectance by the specular colour alone is the same surface.
+        let tinted = albedo(&with(1.5, Vec3::new(0.1, 0.5, 0.2) / 0.04), Vec4::ONE);
+        assert!((half - tinted).length() < 1e-4, "{half} {tinted}");
+    }
+
+    #[test]
+    fn textures_of_the_specular_colour_count_too() {
+        let texture = TextureRef {
+            image: 0,
+            uv_set: 0,
+            transform: Affine2::IDENTITY,
+            wrap_u: Wrap::Repeat,
+            wrap_v: Wrap::Repeat,
+            nearest: true,
+        };
+        let material = Material {
+            ior: 1e6,
+            specular_color_texture: Some(texture),
+            ..Material::dielectric(Vec3::ONE, 0.5)
+        };
+        let bright = albedo(&material, Vec4::new(0.0, 0.04, 0.0, 1.0));
+        assert!((bright - Vec3::ONE).length() < 1e-4, "{bright}");
+        let dark = albedo(&material, Vec4::new(0.0, 1.0, 0.0, 1.0));
+        assert!(dark.max_element() < 1e-5, "{dark}");
+    }
 }

@@ -50,7 +50,7 @@ fn specular_glossiness_becomes_a_dielectric_of_the_same_reflectance() {
     gltf.push("materials", json!({"extensions": {"KHR_materials_pbrSpecularGlossiness": extension}}));
     let scene = gltf.scene();
     let material = &scene.materials[0];
-    assert_eq!((material.metallic, material.roughness, material.base_color.x), (0.0, 0.25, 0.25));
+    assert_eq!((material.metallic, material.roughness, material.base_color.x), (0.0, 0.25, 0.5));
     assert!((material.specular_color - Vec3::new(1.0, 0.5, 12.5)).length() < 1e-5);
 }
 
