@@ -10,14 +10,14 @@ use super::{
     extras::{self, CutEntry, Extras},
     geometry::{Geometry, Primitive},
     ignored::{self, Notes},
-    image::{self, Images},
+    image::{self, Images, Wanted},
     light_camera, material,
     nodes::{self, Nodes},
     shape::Shapes,
 };
 use crate::{
     Result,
-    scene::{Camera, ColorSpace, Cut, Instance, Material, Rational, Scene, Skin, Timing, World},
+    scene::{Camera, Cut, Instance, Material, Rational, Scene, Skin, Timing, World},
 };
 use glam::{DAffine3, DMat4, DQuat, DVec3, Vec2};
 use std::{collections::HashMap, path::Path};
@@ -152,7 +152,7 @@ fn read_materials(
     let mut order: Vec<Option<usize>> = Vec::new();
     let mut place: HashMap<Option<usize>, usize> = HashMap::new();
     let mut elements: Vec<Option<Element>> = Vec::new();
-    let mut wanted: Vec<(usize, ColorSpace)> = Vec::new();
+    let mut wanted: Vec<Wanted> = Vec::new();
     for primitive in &primitives {
         if place.contains_key(&primitive.material) {
             continue;

@@ -14,7 +14,11 @@ use crate::{
 use exr::meta::MetaData;
 use image::{DynamicImage, ImageFormat, ImageReader, Limits, RgbaImage};
 use rayon::prelude::*;
-use std::{collections::HashMap, io::Cursor, path::PathBuf};
+use std::{
+    collections::{HashMap, HashSet},
+    io::Cursor,
+    path::PathBuf,
+};
 
 /// Longest side of an image.
 const MAX_SIDE: u32 = 16384;
@@ -24,21 +28,7 @@ const PIXELS_FLOOR: usize = 1 << 24;
 const PIXELS_PER_BYTE: usize = 1024;
 
 /// An image as the scene wants it: which, and how its values are meant.
-type Wanted = (usize, ColorSpaceKey);
-
-/// [`ColorSpace`] as part of a key.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
-enum ColorSpaceKey {
-    Srgb,
-    Linear,
-}
-
-fn key(space: ColorSpace) -> ColorSpaceKey {
-    match space {
-        ColorSpace::Srgb => ColorSpaceKey::Srgb,
-        ColorSpace::Linear => ColorSpaceKey::Linear,
-    }
-}
+pub(super) type Wanted = (usize, ColorSpace);
 
 /// The images that materials use.
 pub(super) struct Images {
@@ -47,6 +37,8 @@ pub(super) struct Images {
     index: HashMap<Wanted, usize>,
     /// Images of the file that have the bytes of another one.
     alias: HashMap<usize, usize>,
+    /// Images of the file without alpha: cut out they are what they are anyway.
+    solid: HashSet<usize>,
 }
 
 /// Where an image's bytes come from, to know two images with the same ones.
@@ -61,12 +53,7 @@ impl Images {
     ///
     /// # Errors
     /// Once `pictures` has no room for them; before anything is decoded.
-    pub fn load(
-        accessors: Accessors,
-        notes: &Notes,
-        pictures: &Pictures,
-        wanted: &[(usize, ColorSpace)],
-    ) -> Result<Self> {
+    pub fn load(accessors: Accessors, notes: &Notes, pictures: &Pictures, wanted: &[Wanted]) -> Result<Self> {
         let document = accessors.document;
         let mut sources: Vec<usize> = wanted.iter().map(|w| w.0).collect();
         sources.sort_unstable();
@@ -92,8 +79,6 @@ impl Images {
                 known.insert(origin, source);
             }
         }
-        let wanted: Vec<Wanted> =
-            wanted.iter().map(|(i, space)| (alias.get(i).copied().unwrap_or(*i), key(*space))).collect();
         let mut pixels = PIXELS_FLOOR.saturating_add(bytes.saturating_mul(PIXELS_PER_BYTE));
         let mut readable = Vec::new();
         for (source, data) in encoded {
@@ -107,9 +92,12 @@ impl Images {
         }
         let decoded: Vec<(usize, Result<DynamicImage, String>)> =
             readable.into_par_iter().map(|(source, data)| (source, decode(&data))).collect();
-        let mut out = Self { images: Vec::new(), index: HashMap::new(), alias };
-        let mut spaces_of: HashMap<usize, Vec<ColorSpaceKey>> = HashMap::new();
-        for (image, space) in wanted {
+        let is_solid = |image: &DynamicImage| !image.color().has_alpha();
+        let solid = decoded.iter().filter(|(_, image)| image.as_ref().is_ok_and(is_solid));
+        let solid = solid.map(|(source, _)| *source).collect();
+        let mut out = Self { images: Vec::new(), index: HashMap::new(), alias, solid };
+        let mut spaces_of: HashMap<usize, Vec<ColorSpace>> = HashMap::new();
+        for (image, space) in wanted.iter().map(|wanted| out.key(*wanted)) {
             let spaces = spaces_of.entry(image).or_default();
             if !spaces.contains(&space) {
                 spaces.push(space);
@@ -142,10 +130,6 @@ impl Images {
                 let (width, height) = image.dimensions();
                 let texels = image.as_raw().as_chunks::<4>().0.to_vec();
                 drop(image);
-                let space = match space {
-                    ColorSpaceKey::Srgb => ColorSpace::Srgb,
-                    ColorSpaceKey::Linear => ColorSpace::Linear,
-                };
                 Image::from_rgba8(&name, width, height, texels, space)
             })
             .collect();
@@ -154,8 +138,14 @@ impl Images {
 
     /// The scene's image for a file's image; none if it could not be had.
     pub fn find(&self, image: usize, space: ColorSpace) -> Option<usize> {
+        self.index.get(&self.key((image, space))).copied()
+    }
+
+    /// The one of several that are alike.
+    fn key(&self, (image, space): Wanted) -> Wanted {
         let image = self.alias.get(&image).copied().unwrap_or(image);
-        self.index.get(&(image, key(space))).copied()
+        let is_cut_out = space == ColorSpace::SrgbCutOut && self.solid.contains(&image);
+        (image, if is_cut_out { ColorSpace::Srgb } else { space })
     }
 }
 

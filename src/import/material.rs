@@ -3,7 +3,7 @@
 use super::{
     document::{Document, Element},
     ignored::Notes,
-    image::Images,
+    image::{Images, Wanted},
 };
 use crate::{
     Result,
@@ -11,9 +11,10 @@ use crate::{
 };
 use glam::{Affine2, Vec2, Vec3, Vec4};
 
-/// Every texture slot that is rendered: the path to its `textureInfo`, and how its image's values are meant.
+/// Every texture slot that is rendered: the path to its `textureInfo`, and how its image's values are meant
+/// where alpha is used.
 const SLOTS: &[(&[&str], ColorSpace)] = &[
-    (&["pbrMetallicRoughness", "baseColorTexture"], ColorSpace::Srgb),
+    (&["pbrMetallicRoughness", "baseColorTexture"], ColorSpace::SrgbCutOut),
     (&["pbrMetallicRoughness", "metallicRoughnessTexture"], ColorSpace::Linear),
     (&["normalTexture"], ColorSpace::Linear),
     (&["occlusionTexture"], ColorSpace::Linear),
@@ -21,7 +22,7 @@ const SLOTS: &[(&[&str], ColorSpace)] = &[
     (&["extensions", "KHR_materials_specular", "specularTexture"], ColorSpace::Linear),
     (&["extensions", "KHR_materials_specular", "specularColorTexture"], ColorSpace::Srgb),
     (&["extensions", "KHR_materials_transmission", "transmissionTexture"], ColorSpace::Linear),
-    (&["extensions", SPECULAR_GLOSSINESS, "diffuseTexture"], ColorSpace::Srgb),
+    (&["extensions", SPECULAR_GLOSSINESS, "diffuseTexture"], ColorSpace::SrgbCutOut),
     (&["extensions", SPECULAR_GLOSSINESS, "specularGlossinessTexture"], ColorSpace::Srgb),
 ];
 
@@ -31,17 +32,37 @@ const SPECULAR_GLOSSINESS: &str = "KHR_materials_pbrSpecularGlossiness";
 const F0: f32 = 0.04;
 
 /// The images that a material of the file uses.
-pub(super) fn wanted_images(material: &Element, notes: &Notes) -> Result<Vec<(usize, ColorSpace)>> {
+pub(super) fn wanted_images(material: &Element, notes: &Notes) -> Result<Vec<Wanted>> {
+    let alpha_mode = alpha_mode(material)?;
     let mut wanted = Vec::new();
     for (path, space) in SLOTS {
         let info = path.iter().try_fold(material.clone(), |element, key| element.get(key));
         if let Some(info) = info
             && let Some(image) = image_of(&info, notes)?
         {
-            wanted.push((image, *space));
+            wanted.push((image, meant(*space, alpha_mode)));
         }
     }
     Ok(wanted)
+}
+
+/// How an image's values are meant in a material that uses alpha or, being opaque, does not.
+fn meant(space: ColorSpace, alpha_mode: AlphaMode) -> ColorSpace {
+    match (space, alpha_mode) {
+        (ColorSpace::SrgbCutOut, AlphaMode::Opaque) => ColorSpace::Srgb,
+        _ => space,
+    }
+}
+
+fn alpha_mode(material: &Element) -> Result<AlphaMode> {
+    Ok(match material.text("alphaMode")? {
+        None | Some("OPAQUE") => AlphaMode::Opaque,
+        Some("MASK") => AlphaMode::Mask(material.f32("alphaCutoff", 0.5)?),
+        Some("BLEND") => AlphaMode::Blend,
+        Some(other) => {
+            return Err(material.error(format!("unknown alphaMode {other}; export the file again")));
+        }
+    })
 }
 
 /// The file's image that a `textureInfo` leads to.
@@ -70,10 +91,12 @@ pub(super) fn read(element: &Element, images: &Images, notes: &Notes) -> Result<
         Some(info) => texture(&info, images, notes, space),
         None => Ok(None),
     };
-    let mut out = Material { name: element.name(), ..Material::default() };
+    let alpha_mode = alpha_mode(element)?;
+    let cut_out = meant(ColorSpace::SrgbCutOut, alpha_mode);
+    let mut out = Material { name: element.name(), alpha_mode, ..Material::default() };
     if let Some(pbr) = element.get("pbrMetallicRoughness") {
         out.base_color = Vec4::from(pbr.f32s("baseColorFactor", [1.0; 4])?).max(Vec4::ZERO);
-        out.base_color_texture = texture(&pbr, "baseColorTexture", ColorSpace::Srgb)?;
+        out.base_color_texture = texture(&pbr, "baseColorTexture", cut_out)?;
         out.metallic = pbr.f32("metallicFactor", 1.0)?.clamp(0.0, 1.0);
         out.roughness = pbr.f32("roughnessFactor", 1.0)?.clamp(0.0, 1.0);
         out.metallic_roughness_texture = texture(&pbr, "metallicRoughnessTexture", ColorSpace::Linear)?;
@@ -90,12 +113,6 @@ pub(super) fn read(element: &Element, images: &Images, notes: &Notes) -> Result<
     }
     out.emissive = Vec3::from(element.f32s("emissiveFactor", [0.0; 3])?).max(Vec3::ZERO);
     out.emissive_texture = texture(element, "emissiveTexture", ColorSpace::Srgb)?;
-    out.alpha_mode = match element.text("alphaMode")? {
-        None | Some("OPAQUE") => AlphaMode::Opaque,
-        Some("MASK") => AlphaMode::Mask(element.f32("alphaCutoff", 0.5)?),
-        Some("BLEND") => AlphaMode::Blend,
-        Some(other) => return Err(element.error(format!("unknown alphaMode {other}; export the file again"))),
-    };
     out.double_sided = element.flag("doubleSided")?.unwrap_or(false);
     out.unlit = element.extension("KHR_materials_unlit").is_some();
     if let Some(extension) = element.extension("KHR_materials_emissive_strength") {
@@ -123,7 +140,7 @@ pub(super) fn read(element: &Element, images: &Images, notes: &Notes) -> Result<
         // The same reflectance as a dielectric with a coloured specular; only the glossiness texture has no place.
         let specular = Vec3::from(extension.f32s("specularFactor", [1.0; 3])?).clamp(Vec3::ZERO, Vec3::ONE);
         out.base_color = Vec4::from(extension.f32s("diffuseFactor", [1.0; 4])?).max(Vec4::ZERO);
-        out.base_color_texture = texture(&extension, "diffuseTexture", ColorSpace::Srgb)?;
+        out.base_color_texture = texture(&extension, "diffuseTexture", cut_out)?;
         (out.metallic, out.metallic_roughness_texture) = (0.0, None);
         out.roughness = 1.0 - extension.f32("glossinessFactor", 1.0)?.clamp(0.0, 1.0);
         out.specular_color = specular / F0;

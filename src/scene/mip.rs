@@ -47,7 +47,7 @@ pub(super) fn halve<T: Copy>(from: Level, to: Level, texels: &mut Vec<T>, averag
     }
 }
 
-/// The average of 8-bit texels in linear light; colours weighed by alpha.
+/// The average of 8-bit texels in linear light; colours weighed by alpha where it cuts out.
 pub(super) fn average_bytes(block: &[[u8; 4]], space: ColorSpace) -> [u8; 4] {
     let (mut color, mut weighed, mut alpha) = (Vec3::ZERO, Vec3::ZERO, 0.0);
     let table = linear_from_code(space);
@@ -58,9 +58,9 @@ pub(super) fn average_bytes(block: &[[u8; 4]], space: ColorSpace) -> [u8; 4] {
         alpha += LINEAR_FROM_BYTE[usize::from(a)];
     }
     let n = block.len() as f32;
-    let rgb = if space == ColorSpace::Srgb && alpha > 0.0 { weighed / alpha } else { color / n };
+    let rgb = if space == ColorSpace::SrgbCutOut && alpha > 0.0 { weighed / alpha } else { color / n };
     let encode = |x: f32| match space {
-        ColorSpace::Srgb => SRGB_FROM_LINEAR[(x * SRGB_STEPS as f32 + 0.5) as usize],
+        ColorSpace::Srgb | ColorSpace::SrgbCutOut => SRGB_FROM_LINEAR[(x * SRGB_STEPS as f32 + 0.5) as usize],
         ColorSpace::Linear => (x * 255.0 + 0.5) as u8,
     };
     let [r, g, b] = rgb.to_array().map(encode);
@@ -89,7 +89,7 @@ pub(super) static LINEAR_FROM_BYTE: [f32; 256] = {
 /// The table for a colour space.
 fn linear_from_code(space: ColorSpace) -> &'static [f32; 256] {
     match space {
-        ColorSpace::Srgb => &LINEAR_FROM_SRGB,
+        ColorSpace::Srgb | ColorSpace::SrgbCutOut => &LINEAR_FROM_SRGB,
         ColorSpace::Linear => &LINEAR_FROM_BYTE,
     }
 }

@@ -4,10 +4,13 @@ use super::mip::{LINEAR_FROM_BYTE, LINEAR_FROM_SRGB, Level, average_bytes, halve
 use glam::{Affine2, Vec2, Vec3, Vec4};
 
 /// Whether an image's values are encoded for display.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum ColorSpace {
     /// sRGB transfer function on R, G and B; A is linear.
     Srgb,
+    /// The same, and A says how much of the surface is there: smaller levels weigh colours by it, so that what lies under
+    /// the cut-out parts of a leaf does not bleed into it.
+    SrgbCutOut,
     /// Values as they are.
     Linear,
 }
@@ -65,9 +68,6 @@ enum Texels {
 impl Image {
     /// Makes an image from 8-bit RGBA, rows from the top. With no texels, or fewer than its size asks for, it is
     /// one white texel.
-    ///
-    /// Where the values are colours, smaller levels weigh them by alpha, so that what lies under the cut-out parts
-    /// of a leaf does not bleed into it.
     pub fn from_rgba8(name: &str, width: u32, height: u32, texels: Vec<[u8; 4]>, space: ColorSpace) -> Self {
         let (width, height, mut texels) = whole(width, height, texels, [255; 4]);
         let levels = levels_of(width, height);
@@ -130,7 +130,7 @@ impl Image {
     /// one texel reads the full image.
     pub fn sample(&self, texture: &TextureRef, uv: Vec2, footprint: f32) -> Vec4 {
         match &self.texels {
-            Texels::Bytes(texels, ColorSpace::Srgb) => {
+            Texels::Bytes(texels, ColorSpace::Srgb | ColorSpace::SrgbCutOut) => {
                 let table: &[f32; 256] = &LINEAR_FROM_SRGB;
                 self.filter(texels, texture, uv, footprint, |texel| {
                     let [r, g, b, a] = texel.map(usize::from);
@@ -356,10 +356,16 @@ mod tests {
     #[test]
     fn hidden_colours_do_not_bleed_into_smaller_levels() {
         let texels = vec![[0, 255, 0, 255], [255, 0, 0, 0], [255, 0, 0, 0], [255, 0, 0, 0]];
-        let image = Image::from_rgba8("leaf", 2, 2, texels, ColorSpace::Srgb);
-        let small = image.sample(&texture(Wrap::Clamp), vec2(0.5, 0.5), 1.0e3);
-        assert_eq!((small.x, small.y), (0.0, 1.0));
-        assert!((small.w - 0.25).abs() < 0.01);
+        let small = |space| {
+            let image = Image::from_rgba8("leaf", 2, 2, texels.clone(), space);
+            image.sample(&texture(Wrap::Clamp), vec2(0.5, 0.5), 1.0e3)
+        };
+        let leaf = small(ColorSpace::SrgbCutOut);
+        assert_eq!((leaf.x, leaf.y), (0.0, 1.0));
+        // Alpha that cuts nothing out hides no colour.
+        let mixed = small(ColorSpace::Srgb);
+        assert!((mixed.x - 0.75).abs() < 0.01 && (mixed.y - 0.25).abs() < 0.01, "{mixed}");
+        assert!((leaf.w - 0.25).abs() < 0.01 && leaf.w == mixed.w);
     }
 
     #[test]

@@ -104,6 +104,33 @@ fn an_image_used_as_colour_and_as_data_is_two_images() {
 }
 
 #[test]
+fn an_image_used_with_its_alpha_and_without_is_two_images() {
+    let solid = {
+        let mut out = std::io::Cursor::new(Vec::new());
+        image::RgbImage::new(4, 4).write_to(&mut out, image::ImageFormat::Png).unwrap();
+        out.into_inner()
+    };
+    // One that has no alpha is the same either way.
+    for (picture, count) in [(png(4, 4), 2), (solid, 1)] {
+        let mut gltf = textured(&format!("data:image/png;base64,{}", base64(&picture)));
+        gltf.json["materials"][0]["emissiveTexture"] = json!({"index": 0});
+        for (mode, count) in [("OPAQUE", 1), ("MASK", count), ("BLEND", count)] {
+            gltf.json["materials"][0]["alphaMode"] = json!(mode);
+            let scene = gltf.scene();
+            let material = &scene.materials[0];
+            let images = [&material.base_color_texture, &material.emissive_texture].map(|t| t.unwrap().image);
+            assert_eq!((scene.images.len(), images[0] == images[1]), (count, count == 1), "{mode}");
+        }
+    }
+    // Gloss is no coverage.
+    let mut gltf = textured(&format!("data:image/png;base64,{}", base64(&png(4, 4))));
+    let extension = json!({"diffuseTexture": {"index": 0}, "specularGlossinessTexture": {"index": 0}});
+    gltf.json["materials"][0] =
+        json!({"alphaMode": "MASK", "extensions": {"KHR_materials_pbrSpecularGlossiness": extension}});
+    assert_eq!(gltf.scene().images.len(), 2);
+}
+
+#[test]
 fn one_file_behind_many_images_is_decoded_once() {
     let folder = TempDir::new().unwrap();
     fs::write(folder.path().join("wood.png"), png(8, 8)).unwrap();

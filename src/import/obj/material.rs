@@ -3,7 +3,7 @@
 use super::{super::ignored::Notes, textures::Textures};
 use crate::{
     Result,
-    scene::{AlphaMode, Material, Volume},
+    scene::{AlphaMode, ColorSpace, Material, Volume},
 };
 use glam::{Vec3, Vec4};
 
@@ -42,12 +42,23 @@ pub(super) fn convert(mtl: &tobj::Material, textures: &mut Textures, place: &str
         Some(mask) => textures.cut_out(diffuse_map, mask, place)?,
         None => None,
     };
+    let opacity = mtl.dissolve.or_else(|| number("Tr").map(|t| 1.0 - t)).unwrap_or(1.0).clamp(0.0, 1.0);
+    // Models 4, 6, 7 and 9 are glass: what is not opaque refracts. The others let through straight on.
+    let glass = opacity < 1.0 && matches!(mtl.illumination_model, Some(4 | 6 | 7 | 9));
+    let alpha_mode = match cut_out {
+        _ if opacity < 1.0 && !glass => AlphaMode::Blend,
+        Some((_, mode)) => mode,
+        None => AlphaMode::Opaque,
+    };
+    let is_opaque = alpha_mode == AlphaMode::Opaque;
+    let space = if is_opaque { ColorSpace::Srgb } else { ColorSpace::SrgbCutOut };
     let base_color_texture = match (cut_out, diffuse_map) {
         (Some((texture, _)), _) => Some(texture),
-        (None, Some(map)) => textures.color(map, place)?,
+        (None, Some(map)) => textures.color(map, place, space)?,
         (None, None) => None,
     };
-    let emissive_texture = unknown("map_Ke").map(|map| textures.color(map, place)).transpose()?.flatten();
+    let glow = unknown("map_Ke").map(|map| textures.color(map, place, ColorSpace::Srgb));
+    let emissive_texture = glow.transpose()?.flatten();
     let normal_map = unknown("norm").or(mtl.normal_texture.as_deref());
     let normal_texture = normal_map.map(|map| textures.normals(map, place)).transpose()?.flatten();
     let color = |c: Option<[f32; 3]>, default: f32| {
@@ -56,10 +67,7 @@ pub(super) fn convert(mtl: &tobj::Material, textures: &mut Textures, place: &str
     // A texture without Kd is meant to be seen as it is.
     let diffuse = color(mtl.diffuse, if base_color_texture.is_some() { 1.0 } else { 0.8 });
     let shininess = mtl.shininess.filter(|s| s.is_finite() && *s >= 0.0);
-    let opacity = mtl.dissolve.or_else(|| number("Tr").map(|t| 1.0 - t)).unwrap_or(1.0).clamp(0.0, 1.0);
     let ior = mtl.optical_density.filter(|n| n.is_finite() && *n > 1.0);
-    // Models 4, 6, 7 and 9 are glass: what is not opaque refracts. The others let through straight on.
-    let glass = opacity < 1.0 && matches!(mtl.illumination_model, Some(4 | 6 | 7 | 9));
     let emits = emissive_texture.is_some() && mtl.emissive.is_none();
     Ok(Material {
         name: mtl.name.clone(),
@@ -74,11 +82,7 @@ pub(super) fn convert(mtl: &tobj::Material, textures: &mut Textures, place: &str
         normal_texture,
         emissive: if emits { Vec3::ONE } else { color(mtl.emissive, 0.0) },
         emissive_texture,
-        alpha_mode: match cut_out {
-            _ if opacity < 1.0 && !glass => AlphaMode::Blend,
-            Some((_, mode)) => mode,
-            None => AlphaMode::Opaque,
-        },
+        alpha_mode,
         double_sided: !glass,
         ior: ior.unwrap_or(1.5),
         specular: color(mtl.specular, 1.0).max_element().min(1.0),

@@ -38,7 +38,7 @@ type Loaded = (usize, AlphaMode);
 /// What is made of which picture.
 #[derive(Clone, PartialEq, Eq, Hash)]
 pub(super) enum Use {
-    Color(String),
+    Color(String, ColorSpace),
     /// A colour, if there is one, and what cuts it out.
     CutOut(Option<String>, String),
     Normals(String),
@@ -46,9 +46,9 @@ pub(super) enum Use {
 
 impl Textures<'_> {
     /// The picture of a colour; none, and noted at `place`, if it cannot be had.
-    pub fn color(&mut self, text: &str, place: &str) -> Result<Option<TextureRef>> {
+    pub fn color(&mut self, text: &str, place: &str, space: ColorSpace) -> Result<Option<TextureRef>> {
         let statement = self.statement(text, place);
-        let key = Use::Color(statement.file.to_owned());
+        let key = Use::Color(statement.file.to_owned(), space);
         let image = match self.loaded.get(&key) {
             Some(known) => *known,
             None => {
@@ -133,7 +133,8 @@ impl Textures<'_> {
 
     fn keep(&mut self, key: Use, picture: Option<(RgbaImage, AlphaMode)>) -> Option<Loaded> {
         let (name, space) = match &key {
-            Use::Color(name) | Use::CutOut(_, name) => (name, ColorSpace::Srgb),
+            Use::Color(name, space) => (name, *space),
+            Use::CutOut(_, name) => (name, ColorSpace::SrgbCutOut),
             Use::Normals(name) => (name, ColorSpace::Linear),
         };
         let loaded = picture.map(|(picture, mode)| {
