@@ -149,6 +149,17 @@ impl Images {
     }
 }
 
+/// The name of an image's file, if that is not there.
+pub(super) fn missing(document: &Document, source: usize) -> Result<Option<&str>> {
+    let element = document.element("images", source, "/textures")?;
+    let Some(name) = element.text("uri")?.filter(|uri| !uri.is_empty()) else { return Ok(None) };
+    if uri::is_data(name) {
+        return Ok(None);
+    }
+    let is_missing = matches!(uri::resolve(document, name, &element.place)?, Source::Missing(_));
+    Ok(is_missing.then_some(name))
+}
+
 fn unreadable(notes: &Notes, source: usize, why: &str) {
     let feature = format!("image that cannot be read ({why})");
     notes.add(feature, format!("/images/{source}"), "its material has its factors alone");

@@ -3,7 +3,7 @@
 use super::{
     document::{Document, Element},
     ignored::Notes,
-    image::{Images, Wanted},
+    image::{self, Images, Wanted},
 };
 use crate::{
     Result,
@@ -68,10 +68,17 @@ fn alpha_mode(material: &Element) -> Result<AlphaMode> {
 /// The file's image that a `textureInfo` leads to.
 fn image_of(info: &Element, notes: &Notes) -> Result<Option<usize>> {
     let texture = info.document.element("textures", info.required_index("index")?, &info.place)?;
-    let webp = texture.extension("EXT_texture_webp");
-    let source = match webp.map(|e| e.index("source")).transpose()?.flatten() {
-        Some(source) => Some(source),
-        None => texture.index("source")?,
+    let webp = texture.extension("EXT_texture_webp").map(|e| e.index("source")).transpose()?.flatten();
+    let source = match (webp, texture.index("source")?) {
+        (Some(webp), Some(beside)) => match image::missing(info.document, webp)? {
+            Some(name) => {
+                let feature = format!("image {name} is missing");
+                notes.add(feature, format!("/images/{webp}"), "the PNG or JPEG beside it is used");
+                Some(beside)
+            }
+            None => Some(webp),
+        },
+        (webp, beside) => webp.or(beside),
     };
     if source.is_none() {
         let named = texture.get("extensions").and_then(|e| e.members().next().map(|(name, _)| name));

@@ -45,9 +45,14 @@ impl Source {
     }
 }
 
+/// Whether a URI holds its data itself.
+pub(super) fn is_data(uri: &str) -> bool {
+    uri.get(..5).is_some_and(|scheme| scheme.eq_ignore_ascii_case("data:"))
+}
+
 /// Resolves a URI found at `place`, or refuses it.
 pub(super) fn resolve(document: &Document, uri: &str, place: &str) -> Result<Source> {
-    if uri.get(..5).is_some_and(|scheme| scheme.eq_ignore_ascii_case("data:")) {
+    if is_data(uri) {
         return data(document, &uri[5..], place).map(Source::Data);
     }
     if uri.is_empty() {

@@ -131,6 +131,30 @@ fn an_image_used_with_its_alpha_and_without_is_two_images() {
 }
 
 #[test]
+fn the_picture_beside_a_webp_that_is_missing_is_used() {
+    let mut gltf = textured("gone.webp");
+    let png = format!("data:image/png;base64,{}", base64(&png(2, 2)));
+    gltf.push("images", json!({"uri": png}));
+    gltf.json["textures"][0] = json!({"source": 1, "extensions": {"EXT_texture_webp": {"source": 0}}});
+    let scene = gltf.scene();
+    assert_eq!(scene.images[scene.materials[0].base_color_texture.unwrap().image].name, "image 1");
+    assert_eq!(
+        (features(&scene), scene.ignored[0].place.as_str()),
+        (vec!["image gone.webp is missing"], "/images/0")
+    );
+    gltf.json["images"][0]["uri"] = json!(png);
+    let scene = gltf.scene();
+    assert_eq!(scene.images[0].name, "image 0");
+    assert!(scene.ignored.is_empty());
+    // With nothing beside it, it is missed.
+    gltf.json["images"][0]["uri"] = json!("gone.webp");
+    gltf.json["textures"][0]["source"] = json!(null);
+    let scene = gltf.scene();
+    assert!(scene.materials[0].base_color_texture.is_none());
+    assert_eq!(features(&scene), ["image gone.webp is missing"]);
+}
+
+#[test]
 fn one_file_behind_many_images_is_decoded_once() {
     let folder = TempDir::new().unwrap();
     fs::write(folder.path().join("wood.png"), png(8, 8)).unwrap();
