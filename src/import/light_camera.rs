@@ -15,6 +15,9 @@ use std::f32::consts::{FRAC_PI_2, FRAC_PI_4, PI};
 /// Lumens that glTF's exporters write for a radiant watt.
 pub(super) const LUMENS_PER_WATT: f32 = 683.0;
 
+/// Longest side of a sensor that is believed, millimetres.
+const LONGEST_SENSOR: f64 = 1e6;
+
 /// Cameras or lights, and which of the file's each one is: animations speak of those.
 pub(super) struct Carried<T> {
     /// In node order of the file.
@@ -65,14 +68,26 @@ fn lens(element: &Element, notes: &Notes) -> Result<Lens> {
     };
     let near = values.number("znear")?.unwrap_or(0.0).max(0.0);
     let far = values.number("zfar")?.filter(|far| *far > near).unwrap_or(f64::INFINITY);
-    let mut shift = DVec2::ZERO;
+    let (mut shift, mut sensor_height) = (DVec2::ZERO, None);
     if let Some(extras) = element.get("extras") {
         shift = extras.numbers("shift")?.unwrap_or_default().into();
+        sensor_height = height_of_sensor(&extras)?;
         if let Some(dof) = extras.get("dof") {
             notes.add("depth of field", dof.place, "everything is sharp");
         }
     }
-    Ok(Lens { projection, shift, near, far })
+    Ok(Lens { projection, shift, near, far, sensor_height })
+}
+
+/// The height of the film area that the picture covers, millimetres. Its width follows from the image's aspect, as that of the
+/// view does.
+fn height_of_sensor(extras: &Element) -> Result<Option<f64>> {
+    let Some(size) = extras.numbers::<2>("sensor")? else { return Ok(None) };
+    if size.iter().all(|side| *side > 0.0 && *side <= LONGEST_SENSOR) {
+        return Ok(Some(size[1]));
+    }
+    let message = format!("must be [width, height] in millimetres, above 0 and up to {LONGEST_SENSOR}");
+    Err(extras.document.error(extras.place_of("sensor"), message))
 }
 
 /// Reads the lights of the nodes in the scene.

@@ -71,6 +71,7 @@ pub(super) fn apply(scene: &mut Scene, frames: u32) -> Result<()> {
         shift: DVec2::ZERO,
         near,
         far: f64::INFINITY,
+        sensor_height: None,
     };
     scene.cameras = vec![Camera { name: "turntable".into(), node, lens, elsewhere: false }];
     scene.cuts.clear();

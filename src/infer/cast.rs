@@ -328,6 +328,7 @@ mod tests {
             shift: DVec2::ZERO,
             near: 0.1,
             far: f64::INFINITY,
+            sensor_height: None,
         };
         let (eye, right, up, forward) = (DVec3::X * eye_x, DVec3::X, DVec3::Y, DVec3::NEG_Z);
         let view = View { eye, right, up, forward, lens, width: 64, height: 48, pixel_aspect: 1.0 };

@@ -160,7 +160,8 @@ mod tests {
     /// The farthest that a hit a metre before the eye lands from its pixel's centre, where the eye is so far from the origin.
     fn error(away: f64) -> f64 {
         let projection = Projection::Perspective { yfov: 0.8 };
-        let lens = Lens { projection, shift: DVec2::ZERO, near: 0.01, far: f64::INFINITY };
+        let lens =
+            Lens { projection, shift: DVec2::ZERO, near: 0.01, far: f64::INFINITY, sensor_height: None };
         let eye = DVec3::new(0.6, 0.3, -0.74).normalize() * away;
         let (right, up, forward) = (DVec3::X, DVec3::Y, DVec3::NEG_Z);
         let view = View { eye, right, up, forward, lens, width: 1280, height: 720, pixel_aspect: 1.0 };

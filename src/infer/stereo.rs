@@ -129,6 +129,7 @@ mod tests {
                     shift: DVec2::new(shift, 0.1),
                     near: 0.01,
                     far: f64::INFINITY,
+                    sensor_height: None,
                 },
                 width: 640,
                 height: 360,

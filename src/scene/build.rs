@@ -133,7 +133,8 @@ impl Scene {
         let axes = DMat3::from_cols(right, right.cross(forward), -forward);
         let node = self.add_node("", DAffine3::from_mat3_translation(axes, eye));
         let projection = Projection::Perspective { yfov };
-        let lens = Lens { projection, shift: DVec2::ZERO, near: 0.0, far: f64::INFINITY };
+        let lens =
+            Lens { projection, shift: DVec2::ZERO, near: 0.0, far: f64::INFINITY, sensor_height: None };
         let name = format!("Camera{}", self.cameras.len());
         self.cameras.push(Camera { name, node, lens, elsewhere: false });
         self.cameras.len() - 1

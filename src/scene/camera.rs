@@ -28,6 +28,9 @@ pub struct Lens {
     pub near: f64,
     /// Planar distance behind which nothing is seen; infinite where not given.
     pub far: f64,
+    /// Height of the film area that the picture covers, millimetres: what focal lengths are stated for. It changes nothing
+    /// that is seen. None where the file does not say.
+    pub sensor_height: Option<f64>,
 }
 
 /// The two projections of glTF.
@@ -246,7 +249,13 @@ mod tests {
             right: DVec3::X,
             up: DVec3::Y,
             forward: DVec3::NEG_Z,
-            lens: Lens { projection, shift: DVec2::new(0.1, -0.2), near: 0.1, far: f64::INFINITY },
+            lens: Lens {
+                projection,
+                shift: DVec2::new(0.1, -0.2),
+                near: 0.1,
+                far: f64::INFINITY,
+                sensor_height: None,
+            },
             width: 640,
             height: 480,
             pixel_aspect: 1.0,

@@ -36,6 +36,18 @@ fn orthographic_lenses_infinite_far_planes_and_shift_are_read() {
 }
 
 #[test]
+fn sensors_are_read_for_focal_lengths() {
+    let mut gltf = Gltf::new();
+    assert_eq!(gltf.scene().cameras[0].lens.sensor_height, None);
+    gltf.json["cameras"][0]["extras"] = json!({"sensor": [23.76, 13.365]});
+    assert_eq!(gltf.scene().cameras[0].lens.sensor_height, Some(13.365));
+    for broken in [json!([36, 0]), json!([-36, 24]), json!([36, 1e9]), json!([36]), json!(36)] {
+        gltf.json["cameras"][0]["extras"]["sensor"] = broken;
+        assert!(gltf.refused().contains("/cameras/0/extras/sensor"));
+    }
+}
+
+#[test]
 fn lights_are_radiometric_whatever_their_parents_scale() {
     let mut gltf = Gltf::new();
     gltf.json["extensions"] = json!({"KHR_lights_punctual": {"lights": [

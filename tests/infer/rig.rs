@@ -20,6 +20,7 @@ pub fn view(eye: DVec3, yaw: f64, width: u32, height: u32) -> View {
             shift: DVec2::ZERO,
             near: 0.01,
             far: f64::INFINITY,
+            sensor_height: None,
         },
         width,
         height,

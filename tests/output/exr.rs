@@ -93,6 +93,9 @@ fn cases() -> Vec<(&'static str, Frame, Compression)> {
     all.push(("crop_piz", frame(7, FrameKind::Traced, &crop), Compression::Piz));
     all.push(("pixel", frame(0, FrameKind::Traced, &Shape::whole(1, 1)), Compression::Zip));
     all.push(("pixel_piz", frame(0, FrameKind::Traced, &Shape::whole(1, 1)), Compression::Piz));
+    let mut filmed = frame(8, FrameKind::Traced, &Shape::whole(32, 18));
+    filmed.view.lens.sensor_height = Some(13.365);
+    all.push(("filmed", filmed, Compression::Zip));
     let wide = default_layers(frame(-3, FrameKind::Traced, &Shape::whole(16384, 16)));
     all.push(("wide", wide, Compression::Zip));
     all
@@ -208,7 +211,8 @@ fn expected_attributes(frame: &Frame) -> Value {
         n => json!([0, 0, 0, n]),
     };
     let aspect = f64::from(view.width) / f64::from(view.height);
-    let sensor = if aspect >= 1.0 { [36.0, 36.0 / aspect] } else { [36.0 * aspect, 36.0] };
+    let assumed = if aspect >= 1.0 { [36.0, 36.0 / aspect] } else { [36.0 * aspect, 36.0] };
+    let sensor = view.lens.sensor_height.map_or(assumed, |height| [height * aspect, height]);
     attributes["sensorOverallDimensions"] = json!(sensor);
     attributes["pinholeFocalLength"] = json!(sensor[1] / 2.0 / 0.4f64.tan());
     attributes

@@ -35,6 +35,7 @@ pub fn view(width: u32, height: u32) -> View {
             shift: DVec2::new(0.1, -0.2),
             near: 0.1,
             far: f64::INFINITY,
+            sensor_height: None,
         },
         width,
         height,

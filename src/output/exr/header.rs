@@ -31,8 +31,8 @@ pub(crate) const CHECKSUM: &str = "buzz/checksum";
 /// What the checksum's digits are while it is worked out.
 pub(crate) const NO_CHECKSUM: &[u8; 8] = b"00000000";
 
-/// Larger side of the picture on the sensor that focal lengths are stated for, millimetres: Blender's default, since
-/// glTF knows angles only.
+/// Larger side of the picture on the sensor that focal lengths are stated for, millimetres, where the file names none:
+/// Blender's default, since glTF knows angles only.
 const SENSOR_MILLIMETRES: f64 = 36.0;
 
 /// The first bytes of a single-part scan-line file: magic number, version 2, no flags (no name is over 31 bytes).
@@ -189,9 +189,14 @@ fn ndc_from_world(view: &View) -> DMat4 {
 }
 
 /// Width and height of the picture on the sensor, millimetres.
+///
+/// A sensor keeps its height in an image of another aspect, as the view keeps its vertical angle: so the focal length is the
+/// one that the file had in mind.
 fn sensor(view: &View) -> (f64, f64) {
     let aspect = f64::from(view.width) * view.pixel_aspect / f64::from(view.height);
-    if aspect >= 1.0 {
+    if let Some(height) = view.lens.sensor_height {
+        (height * aspect, height)
+    } else if aspect >= 1.0 {
         (SENSOR_MILLIMETRES, SENSOR_MILLIMETRES / aspect)
     } else {
         (SENSOR_MILLIMETRES * aspect, SENSOR_MILLIMETRES)
@@ -234,7 +239,7 @@ mod tests {
             right,
             up: right.cross(forward),
             forward,
-            lens: Lens { projection, shift: DVec2::new(0.1, -0.2), near: 0.5, far },
+            lens: Lens { projection, shift: DVec2::new(0.1, -0.2), near: 0.5, far, sensor_height: None },
             width: 640,
             height: 480,
             pixel_aspect: 1.0,
@@ -264,6 +269,18 @@ mod tests {
                 assert!(ndc_from_world(&view).determinant().abs() > 1e-6, "tools invert it");
             }
         }
+    }
+
+    #[test]
+    fn the_picture_on_the_sensor_has_the_images_aspect() {
+        let mut view = view(Projection::Perspective { yfov: 0.8 }, 20.0);
+        assert_eq!(sensor(&view), (36.0, 27.0));
+        view.pixel_aspect = 0.5;
+        assert_eq!(sensor(&view), (24.0, 36.0));
+        view.lens.sensor_height = Some(18.0);
+        assert_eq!(sensor(&view), (12.0, 18.0));
+        view.pixel_aspect = 2.0;
+        assert_eq!(sensor(&view), (48.0, 18.0));
     }
 
     #[test]
