@@ -49,6 +49,27 @@ def test_the_timeline_lists_all_frames(sequence: Path) -> None:
     assert markers and all(re.search(rf'"frame": {m},\s+"reason"', report) for m in markers)
 
 
+@pytest.fixture(scope="module")
+def across_zero(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Frames -4 to 5 of courtyard, in a folder of their own."""
+    out = tmp_path_factory.mktemp("negative") / "out"
+    convert(ROOT / "scenes/courtyard/courtyard.gltf", out, "-r", "96x54", "-f=-4-5", "--name", "neg.####.exr")
+    return out
+
+
+def test_the_timeline_finds_frames_below_0(across_zero: Path) -> None:
+    """OpenTimelineIO pads the digits alone, so there is a clip on either side of 0, without a gap between them."""
+    path = review(across_zero) / "timeline.otio"
+    timeline = otio.adapters.read_from_file(str(path))
+    clips = list(timeline.find_clips())
+    assert [clip.name for clip in clips] == ["neg -4--1", "neg 0-5"]
+    references = [clip.media_reference for clip in clips]
+    files = [path.parent / r.target_url_for_image_number(i) for r in references for i in range(r.number_of_images_in_sequence())]
+    assert [f.name for f in files] == ["neg.-004.exr", "neg.-003.exr", "neg.-002.exr", "neg.-001.exr", *(f"neg.{n:04}.exr" for n in range(6))]
+    assert all(f.exists() for f in files)
+    assert (timeline.duration().to_frames(), timeline.global_start_time.to_frames()) == (10, -4)
+
+
 def nuke_nodes(text: str) -> list[tuple[str, dict[str, str]]]:
     """The nodes of a Nuke script with their knobs: `Kind {\\n name value ...}`."""
     nodes = []

@@ -79,22 +79,42 @@ impl Review<'_> {
 mod tests {
     use super::*;
 
-    #[test]
-    fn everything_is_written_beside_the_report_and_refers_to_the_frames() {
-        let folder = tempfile::tempdir().unwrap();
-        let frames: BTreeSet<i64> = (1..=3).collect();
-        let names = NamePattern::parse("<stem>.####.exr", "shot").unwrap();
-        let review = Review {
-            folder: folder.path(),
-            names: &names,
-            frames: &frames,
+    fn of<'a>(folder: &'a Path, names: &'a NamePattern, frames: &'a BTreeSet<i64>) -> Review<'a> {
+        Review {
+            folder,
+            names,
+            frames,
             cuts: &[],
             keyframes: &[],
             fps: Rational { numerator: 24, denominator: 1 },
             width: 64,
             height: 36,
             has_class: true,
+        }
+    }
+
+    #[test]
+    fn clips_of_padded_numbers_end_before_0() {
+        let frames: BTreeSet<i64> = (-2..=1).collect();
+        let clips = |pattern: &str| {
+            let names = NamePattern::parse(pattern, "shot").unwrap();
+            let text = of(Path::new(""), &names, &frames).timeline("../");
+            let timeline: serde_json::Value = serde_json::from_str(&text).unwrap();
+            let children = timeline["tracks"]["children"][0]["children"].as_array().unwrap();
+            let reference = |clip: &serde_json::Value| clip["media_references"]["DEFAULT_MEDIA"].clone();
+            let said = |r: serde_json::Value| (r["start_frame"].as_i64(), r["frame_zero_padding"].as_i64());
+            children.iter().map(|clip| said(reference(clip))).collect::<Vec<_>>()
         };
+        assert_eq!(clips("<stem>.####.exr"), [(Some(-2), Some(3)), (Some(0), Some(4))]);
+        assert_eq!(clips("<stem>.%d.exr"), [(Some(-2), Some(0))]);
+    }
+
+    #[test]
+    fn everything_is_written_beside_the_report_and_refers_to_the_frames() {
+        let folder = tempfile::tempdir().unwrap();
+        let frames: BTreeSet<i64> = (1..=3).collect();
+        let names = NamePattern::parse("<stem>.####.exr", "shot").unwrap();
+        let review = of(folder.path(), &names, &frames);
         review.write(&folder.path().join("report.json"), &Thumbnails::of(&frames)).unwrap();
         let read =
             |name: &str| std::fs::read_to_string(folder.path().join("report.review").join(name)).unwrap();

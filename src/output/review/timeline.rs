@@ -34,12 +34,15 @@ impl Review<'_> {
         format!("{timeline:#}\n")
     }
 
-    /// First and last frames of what is shown without a hole or a cut.
+    /// First and last frames of what is shown without a hole or a cut, and without numbers of both signs where these are
+    /// filled up with zeros: a clip has one padding, and theirs differ.
     fn runs(&self) -> Vec<[i64; 2]> {
+        let is_padded = self.names.parts().2 > 1;
+        let begins = |frame: i64| self.cuts.contains(&frame) || (frame == 0 && is_padded);
         let mut runs: Vec<[i64; 2]> = Vec::new();
         for &frame in self.frames {
             match runs.last_mut() {
-                Some([_, last]) if *last + 1 == frame && !self.cuts.contains(&frame) => *last = frame,
+                Some([_, last]) if *last + 1 == frame && !begins(frame) => *last = frame,
                 _ => runs.push([frame, frame]),
             }
         }
@@ -48,6 +51,8 @@ impl Review<'_> {
 
     fn clip(&self, base: &str, [first, last]: [i64; 2], rate: f64) -> Value {
         let (prefix, suffix, width) = self.names.parts();
+        // A minus sign is one of our characters, but none of OpenTimelineIO's digits.
+        let padding = if first < 0 { width.saturating_sub(1) } else { width };
         let inside = self.keyframes.iter().filter(|k| (first..=last).contains(&k.frame));
         let markers: Vec<Value> = inside
             .map(|key| {
@@ -64,7 +69,7 @@ impl Review<'_> {
             "media_references": {"DEFAULT_MEDIA": {
                 "OTIO_SCHEMA": "ImageSequenceReference.1", "name": "", "metadata": {}, "available_range": shown,
                 "available_image_bounds": null, "target_url_base": base, "name_prefix": prefix, "name_suffix": suffix,
-                "start_frame": first, "frame_step": 1, "rate": rate, "frame_zero_padding": width,
+                "start_frame": first, "frame_step": 1, "rate": rate, "frame_zero_padding": padding,
                 "missing_frame_policy": "hold",
             }},
         })
