@@ -1,5 +1,8 @@
 """What stands in `report.review`: opened by OpenTimelineIO, run by Blender, its Nuke script parsed, the movie of docs/review.md made."""
 
+import base64
+import io
+import json
 import re
 import shutil
 import subprocess
@@ -51,10 +54,17 @@ def test_the_timeline_lists_all_frames(sequence: Path) -> None:
 
 @pytest.fixture(scope="module")
 def across_zero(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Frames -4 to 5 of courtyard, in a folder of their own."""
-    out = tmp_path_factory.mktemp("negative") / "out"
-    convert(ROOT / "scenes/courtyard/courtyard.gltf", out, "-r", "96x54", "-f=-4-5", "--name", "neg.####.exr")
-    return out
+    """Frames -4 to 5 of a courtyard that begins at -4, in pixels twice as wide as high."""
+    folder = tmp_path_factory.mktemp("negative")
+    scene = shutil.copytree(ROOT / "scenes/courtyard", folder / "scene") / "courtyard.gltf"
+    document = json.loads(scene.read_text())
+    extras = document["scenes"][0]["extras"]["buzz"]
+    extras |= {"frame_start": -4, "frame_end": 91, "pixel_aspect": 2}
+    for cut in extras["cuts"]:
+        cut["frame"] -= 4
+    scene.write_text(json.dumps(document))
+    convert(scene, folder / "out", "-r", "48x54", "-f=-4-5", "--name", "neg.####.exr")
+    return folder / "out"
 
 
 def test_the_timeline_finds_frames_below_0(across_zero: Path) -> None:
@@ -68,6 +78,16 @@ def test_the_timeline_finds_frames_below_0(across_zero: Path) -> None:
     assert [f.name for f in files] == ["neg.-004.exr", "neg.-003.exr", "neg.-002.exr", "neg.-001.exr", *(f"neg.{n:04}.exr" for n in range(6))]
     assert all(f.exists() for f in files)
     assert (timeline.duration().to_frames(), timeline.global_start_time.to_frames()) == (10, -4)
+
+
+def test_pictures_have_the_shape_of_what_is_shown(across_zero: Path) -> None:
+    """The contact sheet's and the report's, and what Nuke is told: 48x54 pixels of aspect 2 are 96 wide."""
+    folder = review(across_zero)
+    assert Image.open(folder / "sheet.png").size == (6 * 100 + 4, 2 * 58 + 4)
+    pictures = re.findall(r"data:image/\w+;base64,([\w+/=]+)", folder.with_suffix(".html").read_text())
+    assert {Image.open(io.BytesIO(base64.b64decode(p))).size for p in pictures} == {(96, 54)}
+    root = nuke_nodes((folder / "nuke.nk").read_text())[0][1]
+    assert root["format"] == "48 54 0 0 48 54 2 Buzz"
 
 
 def nuke_nodes(text: str) -> list[tuple[str, dict[str, str]]]:

@@ -115,7 +115,7 @@ pub fn run(args: ConvertArgs) -> Result<ExitCode> {
     let count = to_render.iter().flat_map(|&f| pictures_of(f, &job.settings)).count();
     let work = Work { frames: count, on_the_way: plan.on_the_way(&to_render) };
     let progress = Progress::new(args.output.progress, work, interrupt);
-    let mut thumbnails = Thumbnails::of(&frames);
+    let mut thumbnails = Thumbnails::of(&frames, timing.pixel_aspect);
     for record in skipped.iter().filter(|r| r.id.eye != Some(StereoEye::Right)) {
         thumbnails.read(record.id.number, &sink.folder().file_of(record.id));
     }
@@ -176,6 +176,7 @@ pub fn run(args: ConvertArgs) -> Result<ExitCode> {
         fps: timing.fps,
         width: job.settings.width,
         height: job.settings.height,
+        pixel_aspect: timing.pixel_aspect,
         has_class: job.settings.aovs.contains(Aov::Class),
     };
     review.write(&report_path, &thumbnails)?;

@@ -41,11 +41,13 @@ pub struct Thumbnail {
 
 /// The small pictures of a run. They are kept encoded, or a long run would hold a hundred megabytes of them; the beauty
 /// under its frame's own exposure, until all frames are known and with them the sequence's.
-#[derive(Debug, Default)]
+#[derive(Debug)]
 pub struct Thumbnails {
     chosen: BTreeSet<i64>,
     small: BTreeMap<i64, Small>,
     percentile: Percentile,
+    /// Width of a frame's pixel over its height; those of pictures are square.
+    pixel_aspect: f64,
 }
 
 /// A frame made small: JPEG and WebP files.
@@ -58,10 +60,12 @@ struct Small {
 }
 
 impl Thumbnails {
-    /// For the run of `frames`: of all, or of 200 that are spread evenly.
-    pub fn of(frames: &BTreeSet<i64>) -> Self {
+    /// For the run of `frames`: of all, or of 200 that are spread evenly. Pictures have the shape of what is shown, whatever
+    /// the aspect of the frames' pixels.
+    pub fn of(frames: &BTreeSet<i64>, pixel_aspect: f64) -> Self {
         let step = frames.len().div_ceil(MOST_FRAMES).max(1);
-        Self { chosen: frames.iter().copied().step_by(step).collect(), ..Self::default() }
+        let chosen = frames.iter().copied().step_by(step).collect();
+        Self { chosen, small: BTreeMap::new(), percentile: Percentile::default(), pixel_aspect }
     }
 
     /// Takes a frame's pictures from its file; a file that cannot be read leaves it without.
@@ -81,7 +85,7 @@ impl Thumbnails {
         if !self.chosen.contains(&number) || width == 0 || color.is_empty() {
             return;
         }
-        let grid = Grid::new(width, color.len() / width);
+        let grid = Grid::new(width, color.len() / width, self.pixel_aspect);
         let (columns, color) = (grid.columns as u32, grid.means(color));
         let mut percentile = Percentile::default();
         percentile.add(&color);
@@ -147,9 +151,12 @@ struct Grid {
 }
 
 impl Grid {
-    fn new(width: usize, height: usize) -> Self {
-        let shrink = |side: usize| (side * SIDE / width.max(height).max(SIDE)).max(1);
-        Self { size: (width, height), columns: shrink(width), rows: shrink(height) }
+    /// Small pixels are square: the side along which large ones are longer is stretched, so that none is lost.
+    fn new(width: usize, height: usize, pixel_aspect: f64) -> Self {
+        let wide = (width as f64 * pixel_aspect.max(1.0)).round() as usize;
+        let high = (height as f64 * pixel_aspect.recip().max(1.0)).round() as usize;
+        let shrink = |side: usize| (side * SIDE / wide.max(high).max(SIDE)).max(1);
+        Self { size: (width, height), columns: shrink(wide), rows: shrink(high) }
     }
 
     /// The mean of the pixels that fall on each small one; what is not finite counts as black.
@@ -238,24 +245,40 @@ mod tests {
 
     #[test]
     fn pictures_are_made_small_and_never_large() {
-        let grid = Grid::new(1024, 512);
+        let grid = Grid::new(1024, 512, 1.0);
         assert_eq!((grid.columns, grid.rows), (256, 128));
         let pixels: Vec<[f32; 4]> = (0..1024 * 512).map(|i| [(i % 1024 / 4) as f32; 4]).collect();
         let means = grid.means(&pixels);
         assert!(means.iter().enumerate().all(|(i, m)| m[0] == (i % 256) as f32));
         let classes: Vec<u8> = (0..1024 * 512).map(|i| (i % 4) as u8).collect();
         assert!(grid.centers(&classes).iter().all(|&c| c == 2));
-        let grid = Grid::new(3, 2);
+        let grid = Grid::new(3, 2, 1.0);
         assert_eq!((grid.columns, grid.rows), (3, 2));
         assert_eq!(grid.centers(&[1, 2, 3, 4, 5, 6]), [1, 2, 3, 4, 5, 6]);
         assert_eq!(grid.centers::<u8>(&[]), [0; 0]);
-        assert_eq!((Grid::new(100_000, 10).columns, Grid::new(100_000, 10).rows), (256, 1));
+        let grid = Grid::new(100_000, 10, 1.0);
+        assert_eq!((grid.columns, grid.rows), (256, 1));
+    }
+
+    #[test]
+    fn pictures_have_the_shape_of_what_is_shown() {
+        let size = |width, height, pixel_aspect| {
+            let grid = Grid::new(width, height, pixel_aspect);
+            (grid.columns, grid.rows)
+        };
+        assert_eq!(size(160, 180, 2.0), (256, 144));
+        assert_eq!(size(1440, 1080, 4.0 / 3.0), (256, 144));
+        assert_eq!(size(64, 36, 0.5), (64, 72));
+        let grid = Grid::new(3, 2, 2.0);
+        assert_eq!(grid.centers(&[1, 2, 3, 4, 5, 6]), [1, 1, 2, 2, 3, 3, 4, 4, 5, 5, 6, 6]);
+        let means = grid.means(&[1.0, 2.0, 3.0, 4.0, 5.0, 6.0].map(|v| [v; 4]));
+        assert_eq!(means.iter().map(|m| m[0]).collect::<Vec<_>>()[..6], [1.0, 1.0, 2.0, 2.0, 3.0, 3.0]);
     }
 
     #[test]
     fn frames_are_shown_under_one_exposure_wherever_they_began() {
         let frames: BTreeSet<i64> = (0..2).collect();
-        let mut thumbnails = Thumbnails::of(&frames);
+        let mut thumbnails = Thumbnails::of(&frames, 1.0);
         let gray = |value: f32| vec![[value, value, value, 1.0]; 64 * 64];
         thumbnails.add(0, 64, &gray(0.5), &[], &[]);
         thumbnails.add(1, 64, &gray(0.125), &[], &[]);
@@ -270,7 +293,7 @@ mod tests {
     #[test]
     fn the_number_of_frames_and_bytes_is_bounded() {
         let frames: BTreeSet<i64> = (-500..500).collect();
-        let mut thumbnails = Thumbnails::of(&frames);
+        let mut thumbnails = Thumbnails::of(&frames, 1.0);
         assert_eq!(thumbnails.chosen.len(), MOST_FRAMES);
         assert!(thumbnails.chosen.contains(&-500));
         // Noise is the worst that can be.

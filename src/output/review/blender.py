@@ -2,8 +2,8 @@
 
     blender --python blender.py
 
-or open it in the Scripting workspace and run it. The scene's size, rate and range become the sequence's. Tried with
-Blender 5.0.
+or open it in the Scripting workspace and run it. The scene's size, pixel aspect, rate and range become the
+sequence's. Tried with Blender 5.0.
 """
 
 from pathlib import Path
@@ -84,6 +84,7 @@ def main():
     scene = bpy.context.scene
     scene.frame_start, scene.frame_end = SEQUENCE["first"], SEQUENCE["last"]
     scene.render.resolution_x, scene.render.resolution_y = SEQUENCE["size"]
+    scene.render.pixel_aspect_x, scene.render.pixel_aspect_y = SEQUENCE["pixel_aspect"]
     numerator, denominator = SEQUENCE["fps"]
     scene.render.fps = round(numerator / denominator)
     scene.render.fps_base = scene.render.fps * denominator / numerator

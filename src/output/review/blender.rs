@@ -15,6 +15,8 @@ impl Review<'_> {
             "first": first,
             "last": last,
             "size": [self.width, self.height],
+            // Blender takes none below 1.
+            "pixel_aspect": [self.pixel_aspect.max(1.0), self.pixel_aspect.recip().max(1.0)],
             "fps": [self.fps.numerator, self.fps.denominator],
             "title": self.title(),
             "class_colors": CLASS_COLORS,

@@ -34,6 +34,8 @@ pub struct Review<'a> {
     pub width: u32,
     /// Pixels.
     pub height: u32,
+    /// Width of a pixel over its height.
+    pub pixel_aspect: f64,
     /// Whether the files hold the class of each pixel.
     pub has_class: bool,
 }
@@ -89,7 +91,22 @@ mod tests {
             fps: Rational { numerator: 24, denominator: 1 },
             width: 64,
             height: 36,
+            pixel_aspect: 1.0,
             has_class: true,
+        }
+    }
+
+    #[test]
+    fn pixels_that_are_not_square_are_said_to_be() {
+        let frames: BTreeSet<i64> = (1..=3).collect();
+        let names = NamePattern::parse("<stem>.####.exr", "shot").unwrap();
+        for (pixel_aspect, nuke, blender) in [(2.0, "2", [2.0, 1.0]), (0.5, "0.5", [1.0, 2.0])] {
+            let review = Review { pixel_aspect, ..of(Path::new(""), &names, &frames) };
+            let script = review.nuke_script("../", 1, 3);
+            assert!(script.contains(&format!(" format \"64 36 0 0 64 36 {nuke} Buzz\"\n")), "{script}");
+            let script: String = review.blender_script("../", 1, 3).split_whitespace().collect();
+            let said = format!("\"pixel_aspect\":[{:?},{:?}]", blender[0], blender[1]);
+            assert!(script.contains(&said), "{script}");
         }
     }
 
@@ -115,19 +132,19 @@ mod tests {
         let frames: BTreeSet<i64> = (1..=3).collect();
         let names = NamePattern::parse("<stem>.####.exr", "shot").unwrap();
         let review = of(folder.path(), &names, &frames);
-        review.write(&folder.path().join("report.json"), &Thumbnails::of(&frames)).unwrap();
+        review.write(&folder.path().join("report.json"), &Thumbnails::of(&frames, 1.0)).unwrap();
         let read =
             |name: &str| std::fs::read_to_string(folder.path().join("report.review").join(name)).unwrap();
         assert!(read("nuke.nk").contains("/../shot.%04d.exr"));
         assert!(read("blender.py").contains("\"../\"") && read("timeline.otio").contains("\"../\""));
         let elsewhere = folder.path().join("reports/r.json");
         std::fs::create_dir_all(elsewhere.parent().unwrap()).unwrap();
-        review.write(&elsewhere, &Thumbnails::of(&frames)).unwrap();
+        review.write(&elsewhere, &Thumbnails::of(&frames, 1.0)).unwrap();
         let text = std::fs::read_to_string(folder.path().join("reports/r.review/timeline.otio")).unwrap();
         assert!(text.contains(folder.path().canonicalize().unwrap().to_str().unwrap()));
         let none = BTreeSet::new();
         let empty = Review { frames: &none, ..review };
-        empty.write(&folder.path().join("none.json"), &Thumbnails::of(&none)).unwrap();
+        empty.write(&folder.path().join("none.json"), &Thumbnails::of(&none, 1.0)).unwrap();
         assert!(!folder.path().join("none.review").exists());
     }
 }

@@ -13,10 +13,10 @@ impl Review<'_> {
             quoted(base)
         };
         let file = format!("{folder}{}%0{digits}d{}", quoted(prefix), quoted(suffix));
-        let (width, height, fps) = (self.width, self.height, self.fps.value());
+        let (width, height, aspect, fps) = (self.width, self.height, self.pixel_aspect, self.fps.value());
         let mut script = format!(
             "Root {{\n inputs 0\n first_frame {first}\n last_frame {last}\n fps {fps}\n \
-             format \"{width} {height} 0 0 {width} {height} 1 Buzz\"\n}}\n\
+             format \"{width} {height} 0 0 {width} {height} {aspect} Buzz\"\n}}\n\
              Read {{\n inputs 0\n file \"{file}\"\n first {first}\n last {last}\n origfirst {first}\n origlast {last}\n \
              origset true\n name Beauty\n xpos 0\n ypos 0\n}}\n"
         );
