@@ -144,7 +144,7 @@ scene.cycles.samples = 1
 scene.view_settings.view_transform = "Standard"
 scene.render.image_settings.file_format = "PNG"
 scene.render.filepath = sys.argv[2]
-scene.frame_set(57)
+scene.frame_set(int(sys.argv[4]))
 bpy.ops.render.render(write_still=True)
 """
 
@@ -155,9 +155,9 @@ def on_screen(channels: dict[str, np.ndarray]) -> np.ndarray:
     return np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * linear ** (1 / 2.4) - 0.055) * 255
 
 
-def run_blender(script: Path, picture: Path, strength: float) -> tuple[str, np.ndarray]:
-    """Runs the script in Blender and renders frame 57 of what it built."""
-    command = [sys.executable, "-c", BLENDER, str(script), str(picture), str(strength)]
+def run_blender(script: Path, picture: Path, strength: float, frame: int = 57) -> tuple[str, np.ndarray]:
+    """Runs the script in Blender and renders a frame of what it built."""
+    command = [sys.executable, "-c", BLENDER, str(script), str(picture), str(strength), str(frame)]
     run = subprocess.run(command, capture_output=True, text=True, check=False)
     assert run.returncode == 0, run.stdout + run.stderr
     return run.stdout, np.asarray(Image.open(picture).convert("RGB"))
@@ -180,6 +180,18 @@ def test_the_blender_script_shows_beauty_and_classes(sequence: Path, tmp_path: P
         seen += where.sum()
         assert np.abs(classes[where].astype(int) - color).max(initial=0) <= 2, number
     assert seen == SIZE[0] * SIZE[1]
+
+
+@pytest.mark.parametrize("window", [(10, 5, 33, 19), (60, 30, 36, 24)])
+def test_the_blender_script_puts_a_crop_at_its_place(tmp_path: Path, window: tuple[int, int, int, int]) -> None:
+    """The crop to the pixel, of odd sizes too, and nothing around it."""
+    out, (x, y, width, height) = tmp_path / "out", window
+    convert(ROOT / "scenes/courtyard/courtyard.gltf", out, "-r", "96x54", "-f", "57", "--crop", ",".join(map(str, window)))
+    _, beauty = run_blender(review(out) / "blender.py", tmp_path / "crop.png", 0.0)
+    expected = np.zeros((SIZE[1], SIZE[0], 3))
+    expected[y : y + height, x : x + width] = on_screen(read_exr(out / "courtyard.0057.exr"))
+    assert beauty.shape == expected.shape
+    assert np.abs(beauty - expected).max() <= 2
 
 
 def test_the_contact_sheet_shows_the_frames(sequence: Path) -> None:

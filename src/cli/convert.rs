@@ -177,6 +177,7 @@ pub fn run(args: ConvertArgs) -> Result<ExitCode> {
         width: job.settings.width,
         height: job.settings.height,
         pixel_aspect: timing.pixel_aspect,
+        window: job.settings.window,
         has_class: job.settings.aovs.contains(Aov::Class),
     };
     review.write(&report_path, &thumbnails)?;

@@ -80,6 +80,19 @@ def class_colors(tree, classes):
     return socket(ramp.outputs, "Color", "Image")
 
 
+def in_place(tree, shown):
+    """A crop at its place in the image. Blender puts it into the middle, on the whole pixel to the lower left."""
+    (width, height), (x, y, columns, rows) = SEQUENCE["size"], SEQUENCE["window"]
+    if (columns, rows) == (width, height):
+        return shown
+    node = new_node(tree, (350, 0), "CompositorNodeTranslate")
+    node.label = "Place of the crop"
+    node.inputs["X"].default_value = x - (width - columns) // 2
+    node.inputs["Y"].default_value = height - y - rows - (height - rows) // 2
+    tree.links.new(shown, node.inputs["Image"])
+    return node.outputs["Image"]
+
+
 def main():
     scene = bpy.context.scene
     scene.frame_start, scene.frame_end = SEQUENCE["first"], SEQUENCE["last"]
@@ -103,9 +116,10 @@ def main():
         tree.links.new(shown, colors[0])
         tree.links.new(class_colors(tree, classes), colors[1])
         shown = next(s for s in mix.outputs if s.type == "RGBA")
+    shown = in_place(tree, shown)
     for kinds in (("NodeGroupOutput", "CompositorNodeComposite"), ("CompositorNodeViewer",)):
         kinds = kinds if hasattr(scene, "compositing_node_group") else kinds[-1:]
-        tree.links.new(shown, new_node(tree, (450, -150 if kinds[-1] == "CompositorNodeViewer" else 0), *kinds).inputs[0])
+        tree.links.new(shown, new_node(tree, (550, -150 if kinds[-1] == "CompositorNodeViewer" else 0), *kinds).inputs[0])
 
 
 main()

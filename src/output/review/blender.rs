@@ -15,6 +15,7 @@ impl Review<'_> {
             "first": first,
             "last": last,
             "size": [self.width, self.height],
+            "window": [self.window.x, self.window.y, self.window.width, self.window.height],
             // Blender takes none below 1.
             "pixel_aspect": [self.pixel_aspect.max(1.0), self.pixel_aspect.recip().max(1.0)],
             "fps": [self.fps.numerator, self.fps.denominator],

@@ -9,6 +9,7 @@ mod nuke;
 mod timeline;
 
 use super::{KeyFrame, NamePattern, Thumbnails, write_alone};
+use crate::frame::Window;
 use crate::measure::picture::{contact_sheet, png};
 use crate::scene::Rational;
 use crate::{Error, Result};
@@ -36,6 +37,8 @@ pub struct Review<'a> {
     pub height: u32,
     /// Width of a pixel over its height.
     pub pixel_aspect: f64,
+    /// The part of the image that the files hold.
+    pub window: Window,
     /// Whether the files hold the class of each pixel.
     pub has_class: bool,
 }
@@ -92,6 +95,7 @@ mod tests {
             width: 64,
             height: 36,
             pixel_aspect: 1.0,
+            window: Window { x: 0, y: 0, width: 64, height: 36 },
             has_class: true,
         }
     }
