@@ -134,6 +134,7 @@ tree = scene.compositing_node_group
 image = next(n for n in tree.nodes if n.type == "IMAGE")
 print("SOCKETS", [s.name for s in image.outputs if s.enabled])
 print("RANGE", scene.frame_start, scene.frame_end, scene.render.resolution_x, scene.render.resolution_y, scene.render.fps)
+print("ASPECT", scene.render.pixel_aspect_x, scene.render.pixel_aspect_y)
 mix = next(n for n in tree.nodes if n.label == "Class overlay")
 next(s for s in mix.inputs if s.name == "Factor" and s.enabled).default_value = float(sys.argv[3])
 camera = bpy.data.objects.new("Camera", bpy.data.cameras.new("Camera"))
@@ -180,6 +181,16 @@ def test_the_blender_script_shows_beauty_and_classes(sequence: Path, tmp_path: P
         seen += where.sum()
         assert np.abs(classes[where].astype(int) - color).max(initial=0) <= 2, number
     assert seen == SIZE[0] * SIZE[1]
+
+
+def test_the_blender_script_shows_frames_below_0(across_zero: Path, tmp_path: Path) -> None:
+    """Frame -4 is the scene's frame 1, and so on beyond 0; the scene's pixels are twice as wide as high."""
+    script = review(across_zero) / "blender.py"
+    shown = [(2, "neg.-003.exr"), (5, "neg.0000.exr"), (10, "neg.0005.exr")]
+    for frame, name in shown:
+        text, beauty = run_blender(script, tmp_path / "beauty.png", 0.0, frame)
+        assert "frame -4 is shown as frame 1" in text and "RANGE 1 10 48 54 24" in text and "ASPECT 2.0 1.0" in text, text
+        assert np.abs(beauty - on_screen(read_exr(across_zero / name))).max() <= 2, name
 
 
 @pytest.mark.parametrize("window", [(10, 5, 33, 19), (60, 30, 36, 24)])

@@ -3,9 +3,10 @@
     blender --python blender.py
 
 or open it in the Scripting workspace and run it. The scene's size, pixel aspect, rate and range become the
-sequence's. Tried with Blender 5.0.
+sequence's; one that begins below 0 is shown from frame 1 on. Tried with Blender 5.0.
 """
 
+import os
 from pathlib import Path
 
 import bpy
@@ -44,15 +45,46 @@ def linear(byte):
     return v / 12.92 if v <= 0.04045 else ((v + 0.055) / 1.055) ** 2.4
 
 
+def file_name(number):
+    """The name of a frame's file."""
+    prefix, digits, suffix = SEQUENCE["name"]
+    return f"{prefix}{number:0{digits}}{suffix}"
+
+
+def shown_range():
+    """First and last frame in the scene: neither it nor a sequence can begin below 0 in Blender."""
+    first, last = SEQUENCE["first"], SEQUENCE["last"]
+    return (first, last) if first >= 0 else (1, last - first + 1)
+
+
+def counted_from_1(folder):
+    """A folder of links to the files, numbered by the scene's frames: Blender takes a minus sign for a part of the name."""
+    links = Path(__file__).resolve().parent / "from_1"
+    links.mkdir(exist_ok=True)
+    for number in range(SEQUENCE["first"], SEQUENCE["last"] + 1):
+        file, link = folder / file_name(number), links / f"{number - SEQUENCE['first'] + 1:06}.exr"
+        link.unlink(missing_ok=True)
+        if not file.exists():
+            continue
+        try:
+            link.symlink_to(os.path.relpath(file, links))
+        except (OSError, ValueError):
+            # Windows keeps symbolic links for administrators.
+            link.hardlink_to(file)
+    print(f"Blender knows no files below 0: frame {SEQUENCE['first']} is shown as frame 1, by way of {links}")
+    return links
+
+
 def load_image(tree):
     """The sequence, with a socket for each layer."""
     folder = (Path(__file__).resolve().parent / SEQUENCE["folder"]).resolve()
+    first, last = shown_range()
+    file = folder / file_name(first) if first == SEQUENCE["first"] else counted_from_1(folder) / "000001.exr"
     node = new_node(tree, (-600, 0), "CompositorNodeImage")
     node.label = SEQUENCE["title"]
-    node.image = bpy.data.images.load(str(folder / SEQUENCE["first_file"]), check_existing=True)
+    node.image = bpy.data.images.load(str(file), check_existing=True)
     node.image.source = "SEQUENCE"
     node.image.reload()
-    first, last = SEQUENCE["first"], SEQUENCE["last"]
     # Blender shows file number frame - frame_start + 1 + frame_offset.
     node.frame_start, node.frame_duration, node.frame_offset = first, last - first + 1, first - 1
     node.use_auto_refresh = True
@@ -95,7 +127,7 @@ def in_place(tree, shown):
 
 def main():
     scene = bpy.context.scene
-    scene.frame_start, scene.frame_end = SEQUENCE["first"], SEQUENCE["last"]
+    scene.frame_start, scene.frame_end = shown_range()
     scene.render.resolution_x, scene.render.resolution_y = SEQUENCE["size"]
     scene.render.pixel_aspect_x, scene.render.pixel_aspect_y = SEQUENCE["pixel_aspect"]
     numerator, denominator = SEQUENCE["fps"]

@@ -9,9 +9,10 @@ const SCRIPT: &str = include_str!("blender.py");
 impl Review<'_> {
     /// The script, with the frames in folder `base`.
     pub(super) fn blender_script(&self, base: &str, first: i64, last: i64) -> String {
+        let (prefix, suffix, digits) = self.names.parts();
         let sequence = json!({
             "folder": base,
-            "first_file": self.names.file_name(first),
+            "name": [prefix, digits, suffix],
             "first": first,
             "last": last,
             "size": [self.width, self.height],
