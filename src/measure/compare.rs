@@ -48,7 +48,7 @@ pub struct FrameError {
     /// The error.
     #[serde(flatten)]
     pub error: ImageError,
-    /// Where it is worst; none in identical frames.
+    /// Where it is worst, in pixels of the full image; none in identical frames.
     pub worst_place: Option<Place>,
 }
 
@@ -149,7 +149,8 @@ impl Pair {
             self.draw(&a, &b, exposure, folder)?;
         }
         let file = file_name(&self.sequence);
-        let error = FrameError { frame: self.frame, file, error, worst_place: worst_place(&map, a.width) };
+        let worst_place = worst_place(&map, a.width).map(|place| place.in_image(a.origin));
+        let error = FrameError { frame: self.frame, file, error, worst_place };
         Ok((error, matches!(a.kind, Some(FrameKind::Inferred { .. }))))
     }
 
@@ -172,7 +173,9 @@ fn refuse_no_number(path: &Path, frame: &ReadFrame) -> Result<()> {
     let is_none = |pixel: &[f32; 4]| pixel[..3].iter().any(|v| v.is_nan() || *v == f32::NEG_INFINITY);
     let Some(first) = frame.color.iter().position(is_none) else { return Ok(()) };
     let (count, width) = (frame.color.iter().filter(|pixel| is_none(pixel)).count(), frame.width);
-    let place = format!("pixel {},{}", first % width, first / width);
+    let in_image = |within: usize, origin: i32| within as i64 + i64::from(origin);
+    let (x, y) = (in_image(first % width, frame.origin.0), in_image(first / width, frame.origin.1));
+    let place = format!("pixel {x},{y}");
     let message = format!(
         "it is no number (of the frame's pixels: {count}), and cannot be compared; render the frame again"
     );

@@ -5,14 +5,22 @@ use serde::{Deserialize, Serialize};
 /// A square of a picture, and how visible the difference is in it.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Place {
-    /// Left column.
-    pub x: u32,
+    /// Left column; of another renderer's picture it may lie left of the image.
+    pub x: i32,
     /// Top row.
-    pub y: u32,
+    pub y: i32,
     /// Columns and rows.
     pub side: u32,
     /// Mean of the FLIP map in it.
     pub flip: f64,
+}
+
+impl Place {
+    /// The place of a picture that begins at `origin`, in the whole image.
+    #[must_use]
+    pub fn in_image(self, origin: (i32, i32)) -> Self {
+        Self { x: self.x.saturating_add(origin.0), y: self.y.saturating_add(origin.1), ..self }
+    }
 }
 
 /// Side of the squares that are looked at: some two degrees of the view that [`super::PIXELS_PER_DEGREE`] stands for, what an
@@ -31,7 +39,7 @@ pub fn worst_place(map: &[f32], width: usize) -> Option<Place> {
             let rows = (y..y + side).flat_map(|row| &map[row * width + x..][..side]);
             let flip = rows.map(|&v| f64::from(v)).sum::<f64>() / (side * side) as f64;
             if flip > worst.map_or(0.0, |w| w.flip) {
-                worst = Some(Place { x: x as u32, y: y as u32, side: side as u32, flip });
+                worst = Some(Place { x: x as i32, y: y as i32, side: side as u32, flip });
             }
         }
     }
@@ -50,12 +58,14 @@ mod tests {
         map[250 * width + 200] = 0.5;
         let worst = worst_place(&map, width).unwrap();
         let inside =
-            |x: u32, y: u32| (worst.x..worst.x + 128).contains(&x) && (worst.y..worst.y + 128).contains(&y);
+            |x: i32, y: i32| (worst.x..worst.x + 128).contains(&x) && (worst.y..worst.y + 128).contains(&y);
         assert!(inside(200, 250) && !inside(390, 7), "{worst:?}");
         assert!((worst.flip - 0.5 / (128.0 * 128.0)).abs() < 1e-9);
         map[250 * width + 200] = 0.0;
         let worst = worst_place(&map, width).unwrap();
         assert_eq!((worst.x, worst.y), (272, 0), "the corner belongs to a square too");
+        let moved = worst.in_image((-300, 40));
+        assert_eq!((moved.x, moved.y, moved.side), (-28, 40, 128));
     }
 
     #[test]

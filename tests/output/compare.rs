@@ -1,7 +1,7 @@
 //! Sequences of files against each other, ours and another renderer's.
 
 use crate::support::{Shape, default_layers, frame, options};
-use buzz::frame::{Frame, FrameKind};
+use buzz::frame::{Frame, FrameKind, Window};
 use buzz::measure::{Comparison, Exposure, compare, psnr, read_frame};
 use buzz::output::Compression;
 use buzz::output::exr::encode;
@@ -67,6 +67,24 @@ fn a_sequence_is_compared_frame_by_frame() {
             && text.contains("only in the reference"),
         "{text}"
     );
+}
+
+#[test]
+fn a_place_in_a_crop_is_one_of_the_whole_image() {
+    let folder = tempfile::tempdir().unwrap();
+    let (a, b) = (folder.path().join("a"), folder.path().join("b"));
+    let window = Window { x: 30, y: 20, width: 24, height: 16 };
+    let shape = Shape { image: (64, 48), window };
+    let mut frame = default_layers(frame(1, FrameKind::Traced, &shape));
+    write(&b, "walk.0001.exr", &frame);
+    frame.color[2 * 24 + 3][1] += 0.5;
+    write(&a, "walk.0001.exr", &frame);
+    let result = compare(&a, &b, None).unwrap();
+    let place = result.frames[0].worst_place.unwrap();
+    assert_eq!((place.x, place.y, place.side), (30, 20, 16));
+    let json = serde_json::to_value(&result).unwrap();
+    assert_eq!(json["worst"]["worst_place"]["x"], 30);
+    assert!(result.to_string().contains("  30,20 (FLIP"), "{result}");
 }
 
 #[test]

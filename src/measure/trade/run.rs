@@ -289,9 +289,9 @@ impl CheckSink<'_> {
             picture::beauty(color, self.width, self.exposure),
             picture::difference(color, truth, self.width, self.exposure, ENHANCED),
         ];
-        let crops = pictures.map(|whole| {
-            whole.map(|whole| crop_imm(&whole, place.x, place.y, place.side, place.side).to_image())
-        });
+        let (x, y) = (place.x as u32, place.y as u32);
+        let crops = pictures
+            .map(|whole| whole.map(|whole| crop_imm(&whole, x, y, place.side, place.side).to_image()));
         if let [Some(truth), Some(shown), Some(difference)] = crops {
             worst.push(WorstPlace { frame: number, place, truth, shown, difference });
             worst.sort_by(|a, b| b.place.flip.total_cmp(&a.place.flip));
