@@ -149,6 +149,7 @@ impl View {
         let centre = ((corner + size * 0.5) / full * 2.0 - 1.0) * DVec2::new(1.0, -1.0);
         let mut lens = self.lens;
         lens.shift = (lens.shift + centre) / part;
+        lens.sensor_height = lens.sensor_height.map(|height| height * part.y);
         match &mut lens.projection {
             Projection::Perspective { yfov } => *yfov = 2.0 * ((*yfov * 0.5).tan() * part.y).atan(),
             Projection::Orthographic { xmag, ymag } => (*xmag, *ymag) = (*xmag * part.x, *ymag * part.y),
