@@ -166,6 +166,9 @@ class _Export:
             shown = visible & (numbers == number)
             if not shown.any():
                 continue
+            if not len(shape.mesh.vertices):
+                # What geometry nodes have made of it are instances only.
+                continue
             if shape.mesh_index is None:
                 self.lost.add(track.name, "object without faces", "only faces are rendered; give the curve a bevel or the edges a surface")
                 continue

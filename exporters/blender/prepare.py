@@ -12,7 +12,7 @@ import bpy
 from .nodes import drop_muted
 
 # (viewport, render) pairs of properties that modifiers, curves, metaballs and particle settings have.
-_LEVELS = (("levels", "render_levels"), ("screw_steps", "render_steps"), ("steps", "render_steps"))
+_LEVELS = (("levels", "render_levels"), ("screw_steps", "render_steps"), ("steps", "render_steps"), ("viewport_resolution", "resolution"))
 
 
 def prepare(scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer) -> None:
@@ -33,7 +33,8 @@ def prepare(scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer) -> None:
     _show_layers(view_layer.layer_collection)
     for ob in bpy.data.objects:
         _still(ob, "hide_viewport")
-        ob.hide_viewport = False
+        # Hidden objects may be shown by something else, but a hidden instance of a collection is never one.
+        ob.hide_viewport = ob.instance_type == "COLLECTION" and ob.hide_render and not _moves(ob, "hide_render")
         ob.show_instancer_for_viewport = ob.show_instancer_for_render
         for modifier in ob.modifiers:
             _as_rendered(ob, modifier)
@@ -48,6 +49,8 @@ def prepare(scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer) -> None:
             curve.resolution_v = curve.render_resolution_v
     for ball in bpy.data.metaballs:
         ball.resolution = ball.render_resolution
+    for tree in bpy.data.node_groups:
+        _is_render(tree)
     view_layer.update()
 
 
@@ -65,6 +68,12 @@ def _show_layers(layer: bpy.types.LayerCollection) -> None:
     layer.hide_viewport = False
     for child in layer.children:
         _show_layers(child)
+
+
+def _is_render(tree: bpy.types.NodeTree) -> None:
+    """Have geometry nodes hear that they are not in a viewport."""
+    for link in [link for link in tree.links if link.from_node.bl_idname == "GeometryNodeIsViewport"]:
+        tree.links.new(tree.nodes.new("FunctionNodeInputBool").outputs[0], link.to_socket)
 
 
 def _still(ob: bpy.types.Object, path: str) -> None:
@@ -110,6 +119,19 @@ def _particles(settings: bpy.types.ParticleSettings) -> None:
     settings.display_percentage = 100
     settings.child_percent = settings.rendered_child_count
     settings.display_step = settings.render_step
+
+
+def rendered_objects(view_layer: bpy.types.ViewLayer) -> set[str]:
+    """Names of the objects that are in a collection which the view layer renders."""
+    names: set[str] = set()
+    stack = [view_layer.layer_collection]
+    while stack:
+        layer = stack.pop()
+        if layer.exclude or layer.collection.hide_render:
+            continue
+        names |= {ob.name_full for ob in layer.collection.objects}
+        stack += list(layer.children)
+    return names
 
 
 def action_curves(owner: bpy.types.ID) -> list[bpy.types.FCurve]:

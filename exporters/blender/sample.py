@@ -18,6 +18,7 @@ from ..common.report import Lost
 from .cameras import CameraTrack, find_cameras
 from .geometry import GeometryStore
 from .lights import LightTrack
+from .prepare import rendered_objects
 
 _NOT_MESHES = {
     "VOLUME": "volume",
@@ -56,7 +57,7 @@ class Sampler:
         self.lights: dict[Key, LightTrack] = {}
         self.cameras = [CameraTrack(ob) for ob in find_cameras(scene, view_layer)]
         self.geometry = GeometryStore(lost)
-        self._hidden = {ob.name_full for ob in view_layer.objects} - _rendered_objects(view_layer)
+        self._hidden = {ob.name_full for ob in view_layer.objects} - rendered_objects(view_layer)
         # Frame of each sample in the order in which they were taken (`frames` is put in order of time at the end).
         self.taken: list[float] = []
         self.on_sample: Callable[[], None] = lambda: None
@@ -143,9 +144,7 @@ class Sampler:
         """Geometry and lights with a key that is the same at every frame, and whether a render shows them."""
         for instance in depsgraph.object_instances:
             ob = instance.object
-            if ob.type in _NOT_MESHES and not instance.is_instance and not ob.hide_render:
-                self.lost.add(ob.name, _NOT_MESHES[ob.type], "it is left out; convert it to a mesh first (Object > Convert)")
-            if ob.type not in ("MESH", "LIGHT") or _is_portal(ob):
+            if ob.type not in ("MESH", "LIGHT", *_NOT_MESHES) or _is_portal(ob):
                 continue
             if instance.is_instance:
                 parent = instance.parent
@@ -158,7 +157,11 @@ class Sampler:
             else:
                 key = (ob.name_full,)
                 visible = instance.show_self and not ob.hide_render and ob.original.name_full not in self._hidden
-            yield key, instance, visible
+                visible = visible and not _is_copied_by_parent(ob)
+            if ob.type not in _NOT_MESHES:
+                yield key, instance, visible
+            elif visible and _is_something(ob):
+                self.lost.add(ob.name, _NOT_MESHES[ob.type], "it is left out; convert it to a mesh first (Object > Convert)")
 
     def _is_member(self, parent: bpy.types.Object, ob: bpy.types.Object) -> bool:
         """Whether a collection instancer renders an object of its collection (nested hidden collections do not)."""
@@ -176,23 +179,21 @@ def _is_portal(ob: bpy.types.Object) -> bool:
     return ob.type == "LIGHT" and ob.data.type == "AREA" and getattr(getattr(ob.data, "cycles", None), "is_portal", False)
 
 
+def _is_copied_by_parent(ob: bpy.types.Object) -> bool:
+    """Whether a render shows only the copies of an object on its parent's vertices or faces; metaballs stay themselves."""
+    parent = ob.original.parent
+    return parent is not None and parent.instance_type in ("VERTS", "FACES") and ob.original.type != "META"
+
+
+def _is_something(ob: bpy.types.Object) -> bool:
+    """Whether hair or a point cloud has points: geometry nodes may have made a mesh of them."""
+    return ob.type not in ("CURVES", "POINTCLOUD") or len(ob.data.points) > 0
+
+
 def _members(collection: bpy.types.Collection) -> set[str]:
     """Names of the objects of a collection whose collections are all rendered."""
     names = {ob.name_full for ob in collection.objects}
     for child in collection.children:
         if not child.hide_render:
             names |= _members(child)
-    return names
-
-
-def _rendered_objects(view_layer: bpy.types.ViewLayer) -> set[str]:
-    """Names of the objects that are in a collection which the view layer renders."""
-    names: set[str] = set()
-    stack = [view_layer.layer_collection]
-    while stack:
-        layer = stack.pop()
-        if layer.exclude or layer.collection.hide_render:
-            continue
-        names |= {ob.name_full for ob in layer.collection.objects}
-        stack += list(layer.children)
     return names
