@@ -33,6 +33,8 @@ class Shape:
     topology: bytes
     # sample number -> vertex positions; empty for meshes that never change.
     poses: dict[int, np.ndarray] = field(default_factory=dict)
+    # What its object is called in the export scene, and its mesh's place in the file.
+    node: str = ""
     mesh_index: int | None = None
     weights: np.ndarray | None = None
     _distinct: dict[bytes, np.ndarray] = field(default_factory=dict)
@@ -121,7 +123,7 @@ class GeometryStore:
         return len(self.shapes) - 1
 
     def build(self, scene: bpy.types.Scene, samples: np.ndarray, override: bpy.types.Material | None) -> None:
-        """Link one object for each shape into `scene`, named by its number, with shape keys for its key poses.
+        """Link one object for each shape into `scene`, with shape keys for its key poses.
 
         `samples` are the frames of the samples in the order in which they were taken; `override` is the material of all.
         """
@@ -129,6 +131,7 @@ class GeometryStore:
         for number, shape in enumerate(self.shapes):
             ob = bpy.data.objects.new(f"shape-{number}", shape.mesh)
             shape.mesh.name = shape.name
+            shape.node = ob.name
             _fill_slots(shape.mesh, override, made)
             scene.collection.objects.link(ob)
             if len(shape.poses) > 1:

@@ -141,10 +141,10 @@ class _Export:
 
     def _collect(self, document: Document, sampler: Sampler) -> None:
         """Read back which mesh each shape became, and drop the nodes."""
+        shapes = {shape.node: shape for shape in sampler.geometry.shapes}
         for node in document.root.pop("nodes", []):
-            match = re.fullmatch(r"shape-(\d+)", node.get("name", ""))
-            if match and "mesh" in node:
-                shape = sampler.geometry.shapes[int(match[1])]
+            if "mesh" in node:
+                shape = shapes[node["name"]]
                 shape.mesh_index = node["mesh"]
                 # Blender numbers copies (.001); the file gets the artist's name back.
                 document.root["meshes"][node["mesh"]]["name"] = shape.name

@@ -138,3 +138,14 @@ def test_hair_of_which_nodes_make_a_mesh_is_not_lost(blender, export):
     gltf = export()
     assert (gltf.lost_features("Hair"), gltf.lost_features("Mesh")) == (["hair curves"], [])
     assert names(gltf) == ["Mesh"]
+
+
+def test_objects_are_free_in_their_names(blender, export):
+    import blender_scene as b
+
+    b.camera()
+    b.cube("shape-1")
+    b.plane("shape-0")
+    gltf = export()
+    assert gltf.lost_features("shape-0") == gltf.lost_features("shape-1") == []
+    assert [len(gltf.triangles(gltf.node(name))) for name in ("shape-0", "shape-1")] == [2, 12]
