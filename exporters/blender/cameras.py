@@ -135,5 +135,9 @@ def find_cameras(scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer) -> lis
 
 def marker_cuts(scene: bpy.types.Scene) -> list[tuple[int, bpy.types.Object]]:
     """Markers bound to cameras, in order; a camera hidden from render is skipped, as Blender's renderer does."""
-    bound = [(m.frame, m.camera) for m in scene.timeline_markers if m.camera is not None and not m.camera.hide_render]
-    return sorted(bound, key=lambda item: item[0])
+    bound: dict[int, bpy.types.Object] = {}
+    for marker in scene.timeline_markers:
+        if marker.camera is not None and not marker.camera.hide_render:
+            # Of several at one frame, Blender takes the first that was made.
+            bound.setdefault(marker.frame, marker.camera)
+    return sorted(bound.items())

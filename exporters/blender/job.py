@@ -180,21 +180,23 @@ class _Export:
 
     def _cuts(self, sampler: Sampler) -> list[dict[str, Any]]:
         """Which camera is seen when: the one asked for, the markers', or the scene's."""
-        nodes = {track.source.name: track.node for track in sampler.cameras}
+        # Not by name: a library's camera may be called as one of this file.
+        nodes = {track.source: track.node for track in sampler.cameras}
         first, last = self.frames
         if self.options.camera is not None:
-            if self.options.camera not in nodes:
-                have = ", ".join(sorted(nodes)) or "none"
+            asked = next((ob for ob in nodes if ob.name == self.options.camera), None)
+            if asked is None:
+                have = ", ".join(sorted(ob.name for ob in nodes)) or "none"
                 raise InputError(f"camera {self.options.camera!r}: not in scene {self.scene.name!r}; it has {have}")
-            bound = [(first, self.options.camera)]
+            bound = [(first, asked)]
         else:
-            bound = [(frame, ob.name) for frame, ob in cameras.marker_cuts(self.scene)]
+            bound = cameras.marker_cuts(self.scene)
             if not bound and self.scene.camera is not None:
-                bound = [(first, self.scene.camera.name)]
-        for _, name in bound:
-            if nodes.get(name) == -1:
-                raise InputError(f"camera {name!r}: its lens or transform is no usable number; check its clipping, scale, constraints and drivers")
-        cuts = [{"frame": frame, "camera": name, "node": nodes[name]} for frame, name in bound if name in nodes]
+                bound = [(first, self.scene.camera)]
+        for _, ob in bound:
+            if nodes.get(ob) == -1:
+                raise InputError(f"camera {ob.name!r}: its lens or transform is no usable number; check its clipping, scale, constraints and drivers")
+        cuts = [{"frame": frame, "camera": ob.name, "node": nodes[ob]} for frame, ob in bound if ob in nodes]
         if not cuts:
             self.lost.add(self.scene.name, "no camera", "add a camera to the scene, or convert with --turntable")
         return extras.simplify_cuts(cuts, first, last)

@@ -86,6 +86,30 @@ def test_markers_become_cuts(blender, export):
     assert gltf.camera_at(7) == gltf.node("Cam.B")
 
 
+def test_of_markers_at_one_frame_the_first_counts(blender, export):
+    cameras = cut_scene(blender)
+    blender.context.scene.timeline_markers.new("Again", frame=7).camera = cameras[0]
+    blender.context.scene.frame_set(7)
+    assert blender.context.scene.camera == cameras[1]
+    gltf = export()
+    assert gltf.camera_at(7) == gltf.node("Cam.B")
+
+
+def test_cameras_of_one_name_are_not_mixed_up(blender, export, tmp_path):
+    import blender_scene as b
+
+    here = b.camera("Camera", location=(1, 0, 0))
+    blender.data.libraries.write(str(tmp_path / "library.blend"), {here})
+    with blender.data.libraries.load(str(tmp_path / "library.blend"), link=True) as (_, wanted):
+        wanted.objects = ["Camera"]
+    b.link(wanted.objects[0])
+    here.location = (2, 0, 0)
+    for frame, ob in ((1, wanted.objects[0]), (2, here)):
+        blender.context.scene.timeline_markers.new("Cut", frame=frame).camera = ob
+    gltf = export()
+    assert [gltf.world(gltf.camera_at(frame), frame)[0, 3] for frame in (1, 2)] == [1, 2]
+
+
 def test_cut_starts_a_segment(blender, export, buzz):
     """Frame 7 is the first of a segment whose key frame has the reason `cut`, and no frame is inferred from across it."""
     cut_scene(blender)
