@@ -36,11 +36,11 @@ def export_world(scene: bpy.types.Scene, folder: Path, stem: str, lost: Lost) ->
     tree = world.node_tree if world.use_nodes else None
     if tree is None:
         return {"color": [tidy(c) for c in world.color], "strength": 1}, ("color",)
-    surface = _surface(tree)
+    output, surface = _output(tree), _surface(tree)
+    if output is not None and output.inputs["Volume"].is_linked:
+        lost.add(world.name, "world volume", "render the mist in compositing, from depth.Z")
     if surface is None:
         return black, ()
-    if _output(tree).inputs["Volume"].is_linked:
-        lost.add(world.name, "world volume", "render the mist in compositing, from depth.Z")
     _name_losses(world, tree, lost)
     if surface.type == "BACKGROUND" and not surface.inputs["Strength"].is_linked:
         colour, strength = surface.inputs["Color"], surface.inputs["Strength"]

@@ -182,6 +182,16 @@ def test_what_a_world_loses_is_named(blender, export):
     assert set(export().lost_features("World")) == {"light path in the world", "world hidden from the camera"}
 
 
+def test_mist_without_a_sky_is_named(blender, export):
+    background, tree = world(blender)
+    mist = tree.nodes.new("ShaderNodeVolumePrincipled")
+    tree.links.new(mist.outputs[0], background.outputs[0].links[0].to_node.inputs["Volume"])
+    tree.nodes.remove(background)
+    gltf = export()
+    assert gltf.lost_features("World") == ["world volume"]
+    assert gltf.buzz["world"]["color"] == [0, 0, 0]
+
+
 def test_the_view_layer_decides_about_the_world(blender, export):
     world(blender)
     layer = blender.context.view_layer
