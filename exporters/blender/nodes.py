@@ -214,7 +214,12 @@ class _Reader:
             return "an image with clipped edges"
         if image.source == "TILED":
             return "a tiled image (UDIM)"
+        if out.name == "Alpha" and image.alpha_mode == "NONE":
+            return "an image whose alpha is off"
         space = image.colorspace_settings
+        # Blender multiplies colours by an alpha that is not used beside them.
+        if out.name == "Color" and not node.outputs["Alpha"].is_linked and not space.is_data and _has_holes(image):
+            return "a transparent image without its alpha"
         # A PNG file is copied as it is, deep or not; other float images are not encoded as they are decoded.
         deep = image.is_float and not (image.source == "FILE" and image.file_format == "PNG")
         if out.name == "Color" and (deep or (space.name != "sRGB" if is_colour else not space.is_data)):
@@ -300,6 +305,16 @@ def _is_grey(image: bpy.types.Image | None) -> bool:
     image.pixels.foreach_get(pixels)
     colours = pixels.reshape(-1, image.channels)[:, :3]
     return not colours.size or float(np.ptp(colours, axis=1).max()) < 0.02
+
+
+def _has_holes(image: bpy.types.Image) -> bool:
+    """Whether an image is transparent anywhere, and its alpha means that."""
+    # The depth is that of the file; in memory there always are four channels.
+    if image.channels < 4 or image.depth == 24 or image.alpha_mode not in ("STRAIGHT", "PREMUL"):
+        return False
+    pixels = np.empty(len(image.pixels), dtype=np.float32)
+    image.pixels.foreach_get(pixels)
+    return bool(pixels.size) and float(pixels[3::4].min()) < 1
 
 
 def _place(socket: bpy.types.NodeSocket) -> tuple | None:

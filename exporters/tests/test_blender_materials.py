@@ -126,7 +126,18 @@ def tiled(blender, shader):
     return texture(blender, shader, image=made)
 
 
+def cut_out(blender, shader, output="Color", **settings):
+    """An output of an image that is transparent on one side."""
+    image = picture(blender, **settings)
+    pixels = np.array(image.pixels)
+    pixels[3::8] = 0
+    image.pixels.foreach_set(np.float32(pixels))
+    image.pack()
+    return texture(blender, shader, image=image).node.outputs[output]
+
+
 UNREADABLE = {
+    "transparent": (cut_out, "a transparent image without its alpha"),
     "generated": (by("Generated"), "an image by generated coordinates"),
     "object": (by("Object"), "an image by object coordinates"),
     "window": (by("Window"), "an image by window coordinates"),
@@ -151,6 +162,7 @@ UNREADABLE = {
 }
 READABLE = {
     "plain": texture,
+    "packed channels": lambda b, s: cut_out(b, s, alpha_mode="CHANNEL_PACKED"),
     "uv": by("UV"),
     "uv map": lambda b, s: texture(b, s, node(s, "UVMap", uv_map="UVMap").outputs[0]),
     "mapping": mapped(),
@@ -252,6 +264,13 @@ def test_what_shares_a_texture_is_baked_together(blender, surface, export):
     names = gltf.root["images"][0]["name"]
     assert "Grey-Metallic" in names
     assert "Grey-Roughness" in names
+
+
+@pytest.mark.parametrize(("mode", "names"), [("STRAIGHT", ["Picture"]), ("NONE", ["Grey-Alpha"])])
+def test_alpha_that_is_off_is_baked(blender, surface, export, mode, names):
+    link(cut_out(blender, surface, "Alpha", alpha_mode=mode), surface.inputs["Alpha"])
+    gltf = export(bake=16)
+    assert [i["name"] for i in gltf.root["images"]] == names
 
 
 def test_alpha_clip_is_read(blender, surface, export):
