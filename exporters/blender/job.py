@@ -27,7 +27,7 @@ from . import cameras, world
 from .bake import bake_procedural
 from .images import name_as_files
 from .losses import name_scene_losses
-from .materials import prepare_materials
+from .materials import as_rendered, prepare_materials
 from .output import GENERATOR, Output
 from .prepare import prepare
 from .sample import InstanceTrack, Sampler
@@ -122,9 +122,11 @@ class _Export:
         temporary = bpy.data.scenes.new("export")
         bpy.context.window.scene = temporary
         sampler.geometry.build(temporary, np.array(sampler.taken), self.view_layer.material_override)
+        for material in _materials(temporary):
+            as_rendered(material, self.scene.render.engine)
         if self.options.bake:
             bake_procedural(temporary, self.options.bake, self.options.progress)
-        materials = list(dict.fromkeys(slot.material for ob in temporary.collection.objects for slot in ob.material_slots))
+        materials = _materials(temporary)
         prepare_materials(materials, self.lost)
         artist = name_as_files(materials)
         target = self.output.folder / f"{self.output.stem}{self.output.path.suffix}"
@@ -227,6 +229,10 @@ class _Export:
             document.root["scenes"][0].pop("nodes")
         extras.check(document.root)
         self.output.publish(document)
+
+
+def _materials(scene: bpy.types.Scene) -> list[bpy.types.Material]:
+    return list(dict.fromkeys(slot.material for ob in scene.collection.objects for slot in ob.material_slots))
 
 
 def _dark(surround: dict) -> bool:

@@ -47,6 +47,19 @@ def prepare_materials(materials: list[bpy.types.Material], lost: Lost) -> None:
             _name_losses(shader, meshes_of(material), material.name, lost)
 
 
+def as_rendered(material: bpy.types.Material, engine: str) -> None:
+    """Leave of a material what one engine renders, for Blender's exporter asks for none."""
+    if engine == "CYCLES":
+        # It shows both sides of everything.
+        material.use_backface_culling = False
+    tree = material.node_tree
+    shown = tree.get_output_node("CYCLES" if engine == "CYCLES" else "EEVEE") if tree is not None else None
+    if shown is not None:
+        for node in [node for node in tree.nodes if node.type == "OUTPUT_MATERIAL" and node != shown]:
+            tree.nodes.remove(node)
+        shown.target, shown.is_active_output = "ALL", True
+
+
 def default_surface() -> bpy.types.Material:
     """What Blender shows where there is no material; glTF would have rough metal there."""
     material = bpy.data.materials.new("Default Surface")

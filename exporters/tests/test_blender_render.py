@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
 
 
@@ -149,3 +150,28 @@ def test_objects_are_free_in_their_names(blender, export):
     gltf = export()
     assert gltf.lost_features("shape-0") == gltf.lost_features("shape-1") == []
     assert [len(gltf.triangles(gltf.node(name))) for name in ("shape-0", "shape-1")] == [2, 12]
+
+
+@pytest.mark.parametrize("engine", ["CYCLES", "EEVEE"])
+def test_materials_are_those_of_the_engine(blender, export, engine):
+    """Cycles shows both sides of every face; of two outputs each engine has its own."""
+    import blender_scene as b
+
+    b.camera()
+    scene = blender.context.scene
+    if engine == "CYCLES":
+        scene.render.engine = engine
+    made, shader = b.material()
+    made.use_backface_culling = True
+    shader.inputs["Base Color"].default_value = (0, 1, 0, 1)
+    tree = made.node_tree
+    next(node for node in tree.nodes if node.type == "OUTPUT_MATERIAL").target = "EEVEE"
+    output, red = tree.nodes.new("ShaderNodeOutputMaterial"), tree.nodes.new("ShaderNodeBsdfPrincipled")
+    output.target = "CYCLES"
+    red.inputs["Base Color"].default_value = (1, 0, 0, 1)
+    tree.links.new(red.outputs[0], output.inputs["Surface"])
+    b.plane().data.materials.append(made)
+    (written,) = export().root["materials"]
+    cycles = engine == "CYCLES"
+    np.testing.assert_allclose(written["pbrMetallicRoughness"]["baseColorFactor"], (1, 0, 0, 1) if cycles else (0, 1, 0, 1))
+    assert written.get("doubleSided", False) == cycles
