@@ -116,12 +116,16 @@ class Task:
             self.error = line.removeprefix(_PROGRAM).removeprefix("error:").strip()
 
 
-def export_command(blender: str, blend: Path, output: Path, options: Sequence[str]) -> list[str]:
-    """The command that exports a file in a Blender of its own (or, with the bpy package, in a Python)."""
+def export_command(blender: str, blend: Path, output: Path, options: Sequence[str], trusted: bool = False) -> list[str]:
+    """The command that exports a file in a Blender of its own (or, with the bpy package, in a Python).
+
+    The drivers and scripts of a file that is `trusted` are run.
+    """
     script = str(Path(__file__).resolve().parent / "export.py")
     if blender:
-        return [blender, "--background", "--factory-startup", str(blend), "--python-exit-code", "1", "--python", script, "--", str(output), *options]
-    return [sys.executable, script, str(blend), str(output), *options]
+        start = [blender, "--background", "--factory-startup", *(["--enable-autoexec"] if trusted else []), str(blend)]
+        return [*start, "--python-exit-code", "1", "--python", script, "--", str(output), *options]
+    return [sys.executable, script, str(blend), str(output), *options, *(["--scripts"] if trusted else [])]
 
 
 def find_converter(preferred: str) -> str | None:

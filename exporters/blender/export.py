@@ -31,6 +31,7 @@ def _arguments(inside_blender: bool, argv: list[str]) -> argparse.Namespace:
     parser = argparse.ArgumentParser(prog=program, description="Export a Blender file's shot to glTF with nothing lost.")
     if not inside_blender:
         parser.add_argument("blend", type=Path, help="the .blend file (it is not changed)")
+        parser.add_argument("--scripts", action="store_true", help="run the Python of its drivers and texts: for files that you trust")
     parser.add_argument("output", type=Path, help="where to write: .gltf or .glb")
     parser.add_argument("--frames", type=_pair("-"), help="FIRST-LAST (the scene's)")
     parser.add_argument("--resolution", type=_size, help="WIDTHxHEIGHT (the scene's)")
@@ -81,7 +82,7 @@ def main() -> int:
             if not arguments.blend.is_file():
                 raise report.InputError(f"{arguments.blend}: no such file")
             try:
-                bpy.ops.wm.open_mainfile(filepath=str(arguments.blend.resolve()), load_ui=False)
+                bpy.ops.wm.open_mainfile(filepath=str(arguments.blend.resolve()), load_ui=False, use_scripts=arguments.scripts)
             except RuntimeError as error:
                 detail = " ".join(str(error).split())
                 raise report.InputError(f"{arguments.blend}: not a Blender file that {bpy.app.version_string} opens ({detail})") from None

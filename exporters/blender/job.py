@@ -26,7 +26,7 @@ from ..common.report import ExportError, InputError, Lost
 from . import cameras, world
 from .bake import bake_procedural
 from .images import name_as_files
-from .losses import name_scene_losses
+from .losses import name_scene_losses, name_scripts
 from .materials import as_rendered, prepare_materials
 from .output import GENERATOR, Output
 from .prepare import prepare
@@ -95,6 +95,7 @@ class _Export:
         sky: list[dict[str, Any]] = []
         sampler.on_sample = lambda: sky.append(world.sample_world(self.scene))
         sampler.run(*self.frames)
+        name_scripts(self.lost)
         sky = [sky[i] for i in np.argsort(np.array(sampler.taken), kind="stable")]
         self.scene.frame_set(self.frames[0])
         self.options.progress(f"writing {len(sampler.geometry.shapes)} meshes")

@@ -3,10 +3,21 @@
 from __future__ import annotations
 
 import math
+from pathlib import Path
 
 import bpy
 
 from ..common.report import Lost
+from .prepare import is_animated, rendered_objects
+
+_SURFACES = {"MESH", "CURVE", "SURFACE", "FONT", "META"}
+# Which rays a surface may be hidden from, where that makes a difference.
+_RAYS = {
+    "visible_camera": ("hidden from camera rays", "it is seen here; hide it from the render or leave it out"),
+    "visible_glossy": ("hidden from reflections", "mirrors show it here"),
+    "visible_transmission": ("hidden from transmission rays", "it is seen through glass here"),
+    "visible_shadow": ("without a shadow", "it throws one here"),
+}
 
 
 def name_scene_losses(scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer, lost: Lost) -> None:
@@ -29,25 +40,75 @@ def name_scene_losses(scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer, l
     for camera in {m.camera for m in scene.timeline_markers if m.camera} | {scene.camera}:
         if camera is not None and camera.type == "CAMERA" and camera.data.dof.use_dof:
             lost.add(camera.name, "depth of field", "it is not rendered; use depth.Z in compositing")
+    if render.use_freestyle and view_layer.use_freestyle:
+        lost.add(scene.name, "Freestyle lines", "they are not drawn; render them by themselves (As Render Pass) for compositing")
+    if render.use_sequencer and scene.sequence_editor and _strips(scene.sequence_editor):
+        lost.add(scene.name, "video sequencer", "the scene is rendered, not its strips; edit the finished frames")
+    for other in scene.view_layers:
+        if other.use and other != view_layer:
+            lost.add(other.name, "further view layer", f"only {view_layer.name!r} is exported; export again with Use for Rendering on in this one only")
     if not view_layer.use_solid:
         lost.add(view_layer.name, "view layer without surfaces", "they are rendered; hide the objects from the render")
     _name_layers(view_layer.layer_collection, lost)
-    for ob in scene.objects:
-        if ob.hide_render:
+    _name_missing_data(lost)
+    rendered = rendered_objects(view_layer)
+    for ob in _with_instanced([ob for ob in scene.objects if ob.name_full in rendered]):
+        _name_object(ob, lost)
+
+
+def _strips(editor: bpy.types.SequenceEditor) -> bool:
+    # Called otherwise before Blender 5.0.
+    return len(editor.strips_all if hasattr(editor, "strips_all") else editor.sequences_all) > 0
+
+
+def name_scripts(lost: Lost) -> None:
+    """Drivers and scripts that Blender was not allowed to run; it knows once they would have."""
+    if bpy.app.autoexec_fail:
+        what = f"Python that was not allowed to run ({bpy.app.autoexec_fail_message})"
+        lost.add(Path(bpy.data.filepath).name, what, "what it moves rests; if you trust the file, allow it (blender --enable-autoexec, export.py --scripts)")
+
+
+def _name_missing_data(lost: Lost) -> None:
+    """What is linked from a library that has it no more, or is itself not there."""
+    missing: dict[str, list[str]] = {}
+    for item in bpy.data.user_map():
+        if item.is_missing and item.library is not None and not isinstance(item, bpy.types.Library):
+            missing.setdefault(item.library.filepath, []).append(item.name)
+    for path, names in missing.items():
+        shown = ", ".join(sorted(names)[:5]) + (f" and {len(names) - 5} more" if len(names) > 5 else "")
+        lost.add(path, f"missing library data: {shown}", "it is left out; find it with File > External Data > Find Missing Files, or link it anew")
+
+
+def _with_instanced(objects: list[bpy.types.Object]) -> list[bpy.types.Object]:
+    """Objects that a render may show, with those of the collections that they instance."""
+    found: dict[bpy.types.Object, None] = {}
+    for ob in (queue := list(objects)):
+        if ob in found or (ob.hide_render and not is_animated(ob)):
             continue
-        linking = getattr(ob, "light_linking", None)
-        if linking is not None and (linking.receiver_collection or linking.blocker_collection):
-            lost.add(ob.name, "light linking", "it lights all, and all throw its shadow; use the layer of that light in compositing (--aov lights)")
+        found[ob] = None
+        if ob.instance_type == "COLLECTION" and ob.instance_collection is not None:
+            queue += ob.instance_collection.all_objects
+    return list(found)
+
+
+def _name_object(ob: bpy.types.Object, lost: Lost) -> None:
+    linking = getattr(ob, "light_linking", None)
+    if linking is not None and (linking.receiver_collection or linking.blocker_collection):
+        lost.add(ob.name, "light linking", "it lights all, and all throw its shadow; use the layer of that light in compositing (--aov lights)")
+    if ob.type in _SURFACES:
         for flag, label in (("is_holdout", "holdout"), ("is_shadow_catcher", "shadow catcher")):
-            if ob.type == "MESH" and getattr(ob, flag, False):
+            if getattr(ob, flag, False):
                 lost.add(ob.name, label, "it is rendered as an ordinary object; use its objectId in compositing")
-        if ob.type == "MESH" and not getattr(ob, "visible_camera", True):
-            lost.add(ob.name, "hidden from camera rays", "it is seen here; hide it from the render or leave it out")
-        if ob.type == "MESH" and not getattr(ob, "visible_shadow", True):
-            lost.add(ob.name, "without a shadow", "it throws one here")
-        for system in ob.particle_systems:
-            if system.settings.type == "HAIR" and system.settings.render_type == "PATH":
-                lost.add(ob.name, "hair", "it is left out; convert it to a mesh first (Object > Convert)")
+        for flag, (label, action) in _RAYS.items():
+            if not getattr(ob, flag, True):
+                lost.add(ob.name, label, action)
+    elif ob.type == "LIGHT":
+        for flag, label in (("visible_diffuse", "diffuse"), ("visible_glossy", "glossy")):
+            if not getattr(ob, flag, True):
+                lost.add(ob.name, f"light hidden from {label} rays", "it lights all here; use its layer in compositing (--aov lights)")
+    for system in ob.particle_systems:
+        if system.settings.type == "HAIR" and system.settings.render_type == "PATH":
+            lost.add(ob.name, "hair", "it is left out; convert it to a mesh first (Object > Convert)")
 
 
 def _name_layers(layer: bpy.types.LayerCollection, lost: Lost) -> None:

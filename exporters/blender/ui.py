@@ -90,7 +90,9 @@ class _Runner:
         copy = Path(self._folder.name) / (Path(bpy.data.filepath).name or "untitled.blend")
         # copy=True leaves the open file's name and its unsaved state as they are; relative paths are remapped in the copy.
         bpy.ops.wm.save_as_mainfile(filepath=str(copy), copy=True, relative_remap=True, compress=False)
-        steps = [("exporting", background.export_command(bpy.app.binary_path, copy, output, self._options(context.scene, settings)))]
+        # What Blender would not run here, it does not run there; the copy is not in the user's trusted folders.
+        trusted = not bpy.app.autoexec_fail
+        steps = [("exporting", background.export_command(bpy.app.binary_path, copy, output, self._options(context.scene, settings), trusted))]
         if convert_to is not None:
             converter = background.find_converter(_preferred_converter())
             if converter is None:

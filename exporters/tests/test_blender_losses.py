@@ -29,3 +29,81 @@ def test_a_view_layer_without_surfaces_is_named(blender, export):
     b.camera()
     blender.context.view_layer.use_solid = False
     assert export().lost_features("ViewLayer") == ["view layer without surfaces"]
+
+
+def test_objects_of_every_kind_and_in_instances_are_looked_at(blender, export):
+    import blender_scene as b
+
+    b.camera()
+    text = b.link(blender.data.objects.new("Text", blender.data.curves.new("Text", "FONT")))
+    text.data.body, text.visible_camera = "a", False
+    b.cube("Mirrored").visible_glossy = False
+    b.light("SUN", "Rim").visible_diffuse = False
+    kept, off = blender.data.collections.new("Kept"), blender.data.collections.new("Off")
+    inside, hidden = b.cube("Inside"), b.cube("Hidden")
+    for ob, collection in ((inside, kept), (hidden, off)):
+        blender.context.scene.collection.objects.unlink(ob)
+        collection.objects.link(ob)
+        ob.is_shadow_catcher = True
+    off.hide_render = True
+    blender.context.scene.collection.children.link(off)
+    empty = b.link(blender.data.objects.new("Instance", None))
+    empty.instance_type, empty.instance_collection = "COLLECTION", kept
+    gltf = export()
+    found = {name: gltf.lost_features(name) for name in ("Text", "Mirrored", "Rim", "Inside", "Hidden")}
+    assert found == {
+        "Text": ["hidden from camera rays"], "Mirrored": ["hidden from reflections"], "Rim": ["light hidden from diffuse rays"],
+        "Inside": ["shadow catcher"], "Hidden": [],
+    }  # fmt: skip
+
+
+def test_what_else_a_render_would_show_is_named(blender, export):
+    import blender_scene as b
+
+    scene = blender.context.scene
+    b.camera()
+    scene.render.use_freestyle = True
+    editor = scene.sequence_editor_create()
+    strips = editor.strips if hasattr(editor, "strips") else editor.sequences
+    strips.new_effect("Fade", "COLOR", 1, 1, **({"length": 3} if blender.app.version >= (5, 0, 0) else {"frame_end": 3}))
+    scene.view_layers.new("Back")
+    scene.view_layers.new("Off").use = False
+    gltf = export()
+    assert {"Freestyle lines", "video sequencer"} <= set(gltf.lost_features("Scene"))
+    assert (gltf.lost_features("Back"), gltf.lost_features("Off")) == (["further view layer"], [])
+
+
+def test_what_a_library_has_no_more_is_named(blender, export, tmp_path):
+    import blender_scene as b
+
+    hero = blender.data.collections.new("Hero")
+    hero.objects.link(b.cube())
+    library = tmp_path / "hero.blend"
+    blender.data.libraries.write(str(library), {hero})
+    blender.ops.wm.read_factory_settings(use_empty=True)
+    b.camera()
+    with blender.data.libraries.load(str(library), link=True) as (_, wanted):
+        wanted.collections = ["Hero"]
+    empty = b.link(blender.data.objects.new("Instance", None))
+    empty.instance_type, empty.instance_collection = "COLLECTION", wanted.collections[0]
+    blender.ops.wm.save_as_mainfile(filepath=str(tmp_path / "shot.blend"))
+    assert not export().lost_features("//hero.blend")
+    library.unlink()
+    blender.ops.wm.open_mainfile(filepath=str(tmp_path / "shot.blend"))
+    assert export().lost_features("//hero.blend") == ["missing library data: Hero"]
+
+
+def test_python_that_was_not_run_is_named(blender, tmp_path):
+    import blender_scene as b
+    from gltf_reader import Gltf
+    from test_blender_script import run
+
+    b.camera()
+    b.cube().driver_add("location", 0).driver.expression = "max([v for v in (frame, 3)])"
+    blender.ops.wm.save_as_mainfile(filepath=str(tmp_path / "shot.blend"))
+    for options, place in (((), 0), (("--scripts",), 3)):
+        done = run(tmp_path / "shot.blend", tmp_path / "anim.gltf", *options)
+        assert done.returncode == 0, done.stderr
+        assert ("warning: shot.blend: Python that was not allowed to run" in done.stderr) == (not options)
+        gltf = Gltf(tmp_path / "anim.gltf")
+        assert gltf.world(gltf.node("Cube"), 1)[0, 3] == place

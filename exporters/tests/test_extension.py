@@ -127,6 +127,15 @@ assert bpy.ops.export_scene.buzz_gltf(filepath={str(tmp_path / "x.gltf")!r}) == 
     assert (tmp_path / "x.gltf").is_file()
 
 
+def test_files_are_trusted_as_they_are_in_the_window():
+    from exporters.blender.background import export_command
+
+    inside = export_command("blender", Path("a.blend"), Path("o.gltf"), [], trusted=True)
+    assert inside.index("--enable-autoexec") < inside.index("a.blend"), "Blender reads its arguments in order"
+    assert "--scripts" in export_command("", Path("a.blend"), Path("o.gltf"), [], trusted=True)
+    assert not {"--enable-autoexec", "--scripts"} & {*export_command("blender", Path("a"), Path("o"), []), *export_command("", Path("a"), Path("o"), [])}
+
+
 def test_progress_is_parsed_and_errors_are_kept():
     from exporters.blender.background import Task
 
