@@ -48,7 +48,7 @@ def read_gprim(prim: Usd.Prim, time: Usd.TimeCode) -> Shape | None:
         value = prim.GetAttribute(name).Get(time) if prim.HasAttribute(name) else None
         return fallback if value is None else value
 
-    axis = _AXES[str(get("axis", "Z"))]
+    axis = _AXES.get(str(get("axis", "Z")), _AXES["Z"])
     if kind == "Sphere":
         r = float(get("radius", 1.0))
         return Shape({"type": "sphere", "sphere": {"radius": r}}, np.eye(4), *_lathe(_arc(0, np.pi, r, 0.0, r)))

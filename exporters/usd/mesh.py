@@ -53,12 +53,13 @@ def add_pose(primitives: list[Primitive], prim: Usd.Prim, time: Usd.TimeCode, le
     return True
 
 
-def _array(attribute: Usd.Attribute, time: Usd.TimeCode, dtype: type) -> np.ndarray:
-    """An attribute's values; empty where it has none or values of a wrong type (a mistyped layer)."""
+def _array(attribute: Usd.Attribute, time: Usd.TimeCode, dtype: type, width: int = 0) -> np.ndarray:
+    """An attribute's values, rows of `width` numbers if any; empty where it has none or values of a wrong type (a mistyped layer)."""
+    shape = (-1, width) if width else -1
     try:
-        return np.array(attribute.Get(time) or [], dtype=dtype)
+        return np.array(attribute.Get(time) or [], dtype=dtype).reshape(shape)
     except (TypeError, ValueError):
-        return np.empty(0, dtype=dtype)
+        return np.empty(0, dtype=dtype).reshape(shape)
 
 
 def may_deform(prim: Usd.Prim) -> bool:
@@ -94,10 +95,10 @@ def _topology(mesh: UsdGeom.Mesh) -> tuple[Usd.Attribute, ...]:
 def _polygons(mesh: UsdGeom.Mesh, time: Usd.TimeCode, levels: int, lost: Lost) -> tuple[Polygons | None, bool]:
     """The mesh with all primvars at corners, subdivided; and whether it has normals."""
     path = str(mesh.GetPath())
-    points = _array(mesh.GetPointsAttr(), time, float).reshape(-1, 3)
+    points = _array(mesh.GetPointsAttr(), time, float, 3)
     counts = _array(mesh.GetFaceVertexCountsAttr(), time, int)
     corners = _array(mesh.GetFaceVertexIndicesAttr(), time, int)
-    if not len(points) or not len(counts):
+    if not len(points) or counts.max(initial=0) < 3:
         lost.add(path, "mesh without faces", "it is left out")
         return None, False
     if counts.sum() != len(corners) or counts.min() < 0 or corners.min() < 0 or corners.max() >= len(points):
@@ -116,6 +117,9 @@ def _polygons(mesh: UsdGeom.Mesh, time: Usd.TimeCode, levels: int, lost: Lost) -
     if subdivide:
         # Authored normals mean nothing on a subdivision surface (UsdGeomMesh: "normals are ignored").
         out.corner.pop("NORMAL", None)
+    if out.counts.min() < 3:
+        # A face of two corners or none is nothing to see, and no rule of subdivision speaks of it.
+        out = _keep(out, out.counts >= 3)
     rule = mesh.GetInterpolateBoundaryAttr().Get(time)
     for level in range(subdivide):
         if len(out.corners) * 4 > _MAX_FACES:
@@ -124,7 +128,7 @@ def _polygons(mesh: UsdGeom.Mesh, time: Usd.TimeCode, levels: int, lost: Lost) -
         out = catmull_clark(out, corners_sharp=rule != UsdGeom.Tokens.edgeOnly)
     out.corner |= {k: v[out.corners] for k, v in out.vertex.items()}
     holes = _array(mesh.GetHoleIndicesAttr(), time, int)
-    good = ~np.isin(out.parents, holes) & (out.counts >= 3)
+    good = ~np.isin(out.parents, holes)
     if not good.all():
         out = _keep(out, good)
     if not len(out.counts):
@@ -139,7 +143,7 @@ def _polygons(mesh: UsdGeom.Mesh, time: Usd.TimeCode, levels: int, lost: Lost) -
 
 
 def _creases(mesh: UsdGeom.Mesh, time: Usd.TimeCode, out: Polygons) -> None:
-    lengths = _array(mesh.GetCreaseLengthsAttr(), time, int)
+    lengths = np.maximum(_array(mesh.GetCreaseLengthsAttr(), time, int), 1)
     indices = _array(mesh.GetCreaseIndicesAttr(), time, int)
     sharp = _array(mesh.GetCreaseSharpnessesAttr(), time, float)
     edges, values, at, used = [], [], 0, 0
@@ -158,7 +162,7 @@ def _creases(mesh: UsdGeom.Mesh, time: Usd.TimeCode, out: Polygons) -> None:
     corners = _array(mesh.GetCornerIndicesAttr(), time, int)
     weights = _array(mesh.GetCornerSharpnessesAttr(), time, float)
     n = min(len(corners), len(weights))
-    valid = corners[:n] < len(out.points)
+    valid = (corners[:n] >= 0) & (corners[:n] < len(out.points))
     out.point_sharpness[corners[:n][valid]] = np.minimum(weights[:n][valid], INFINITE)
 
 
@@ -191,7 +195,7 @@ def _primvars(mesh: UsdGeom.Mesh, time: Usd.TimeCode, out: Polygons, smooth: boo
         if values is not None:
             values = _spread(values, normals.GetInterpolation(), out, path, "primvar normals", lost)
     elif mesh.GetNormalsAttr().HasAuthoredValue():
-        data = _array(mesh.GetNormalsAttr(), time, float).reshape(-1, 3)
+        data = _array(mesh.GetNormalsAttr(), time, float, 3)
         values = _spread(data, mesh.GetNormalsInterpolation(), out, path, "normals", lost)
     if values is not None:
         length = np.linalg.norm(values, axis=1, keepdims=True)
@@ -241,7 +245,9 @@ def _spread(values: np.ndarray, interpolation: str, out: Polygons, path: str, na
 def _keep(mesh: Polygons, faces: np.ndarray) -> Polygons:
     mask = np.repeat(faces, mesh.counts)
     corner = {k: v[mask] for k, v in mesh.corner.items()}
-    return Polygons(mesh.points, mesh.counts[faces], mesh.corners[mask], mesh.parents[faces], mesh.edges, mesh.sharpness, mesh.point_sharpness, {}, corner)
+    return Polygons(
+        mesh.points, mesh.counts[faces], mesh.corners[mask], mesh.parents[faces], mesh.edges, mesh.sharpness, mesh.point_sharpness, mesh.vertex, corner
+    )
 
 
 def _flip(mesh: Polygons) -> None:
