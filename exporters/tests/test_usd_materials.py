@@ -226,3 +226,92 @@ def test_display_colour_read_by_a_material(usd_convert):
     gltf = usd_convert(made)
     assert len(np.unique(primitive(gltf, "Card")[1]["COLOR_0"], axis=0)) == 4
     assert "COLOR_0" not in primitive(gltf, "Plain")[1], "display colours do not tint a material that does not read them"
+
+
+def surface(made, **inputs):
+    """A card with a material, and its surface."""
+    prim = u.quad(made, "/World/Card")
+    u.uv(prim, [(0, 0), (1, 0), (1, 1), (0, 1)])
+    material = u.preview(made, "/World/M", **inputs)
+    u.bind(prim, material)
+    return material, UsdShade.Shader(made.GetPrimAtPath("/World/M/Surface"))
+
+
+@pytest.mark.parametrize("name", ["emissiveColor", "roughness", "specularColor"])
+def test_vertex_colours_are_for_the_base_colour_only(usd_convert, name):
+    """What else reads displayColor is named and has its default."""
+    made = u.stage()
+    u.camera(made)
+    _, shader = surface(made)
+    reader = UsdShade.Shader.Define(made, "/World/M/Reader")
+    reader.CreateIdAttr("UsdPrimvarReader_float3")
+    reader.CreateInput("varname", Sdf.ValueTypeNames.String).Set("displayColor")
+    kind = Sdf.ValueTypeNames.Float if name == "roughness" else Sdf.ValueTypeNames.Color3f
+    shader.CreateInput(name, kind).ConnectToSource(reader.ConnectableAPI(), "result")
+    shader.CreateInput("useSpecularWorkflow", Sdf.ValueTypeNames.Int).Set(int(name == "specularColor"))
+    gltf = usd_convert(made)
+    assert any(f.startswith(f"{name} from") for f in gltf.lost_features("/World/M"))
+    assert gltf.root["materials"][0]["pbrMetallicRoughness"]["roughnessFactor"] == 0.5
+    assert gltf.root["materials"][0].get("emissiveFactor", [0, 0, 0]) == [0, 0, 0]
+
+
+@pytest.mark.parametrize("name", ["ior", "opacityThreshold"])
+def test_textures_where_only_a_constant_is_carried_are_named(usd_convert, tmp_path, name):
+    Image.new("RGB", (2, 2)).save(tmp_path / "t.png")
+    made = u.stage()
+    u.camera(made)
+    u.texture(made, surface(made)[0], name, "t.png", "r")
+    assert usd_convert(made).lost_features("/World/M") == [f"{name} from a node"]
+
+
+@pytest.mark.parametrize(("output", "lost"), [("rgba", []), ("out", ["diffuseColor from a UsdUVTexture node"])])
+def test_outputs_that_the_specification_has_not(usd_convert, tmp_path, output, lost):
+    """`rgba` is plain enough to be taken as `rgb`."""
+    Image.new("RGB", (2, 2)).save(tmp_path / "t.png")
+    made = u.stage()
+    u.camera(made)
+    u.texture(made, surface(made)[0], "diffuseColor", "t.png", output)
+    gltf = usd_convert(made)
+    assert gltf.lost_features("/World/M") == lost
+    assert ("baseColorTexture" in gltf.root["materials"][0]["pbrMetallicRoughness"]) == (not lost)
+
+
+def test_inputs_of_a_wrong_type_are_named(usd_convert):
+    made = u.stage()
+    u.camera(made)
+    _, shader = surface(made)
+    shader.CreateInput("diffuseColor", Sdf.ValueTypeNames.Float).Set(1.0)
+    shader.CreateInput("roughness", Sdf.ValueTypeNames.Color3f).Set((1, 1, 1))
+    gltf = usd_convert(made)
+    assert gltf.lost_features("/World/M") == ["diffuseColor of a wrong type", "roughness of a wrong type"]
+    pbr = gltf.root["materials"][0]["pbrMetallicRoughness"]
+    assert (pbr["baseColorFactor"][0], pbr["roughnessFactor"]) == (0.18, 0.5)
+
+
+def test_constant_displacement_is_named_where_it_displaces(usd_convert):
+    made = u.stage()
+    u.camera(made)
+    material, shader = surface(made, displacement=0.3)
+    assert not usd_convert(made).lost_features("/World/M")
+    material.CreateDisplacementOutput().ConnectToSource(shader.ConnectableAPI(), "displacement")
+    assert usd_convert(made).lost_features("/World/M") == ["displacement"]
+
+
+def test_preview_surfaces_of_materialx(usd_convert):
+    made = u.stage()
+    u.camera(made)
+    _, shader = surface(made, diffuseColor=(1.0, 0.5, 0.0), roughness=0.25)
+    shader.CreateIdAttr("ND_UsdPreviewSurface_surfaceshader")
+    gltf = usd_convert(made)
+    pbr = gltf.root["materials"][0]["pbrMetallicRoughness"]
+    assert (pbr["baseColorFactor"][:3], pbr["roughnessFactor"]) == ([1, 0.5, 0], 0.25)
+    assert not gltf.lost_features("/World/M")
+
+
+def test_materialx_numbers_are_those_gltf_may_have(usd_convert):
+    made = u.stage()
+    u.camera(made)
+    _, shader = surface(made)
+    shader.CreateIdAttr("ND_standard_surface_surfaceshader")
+    shader.CreateInput("specular_roughness", Sdf.ValueTypeNames.Float).Set(1.5)
+    assert usd_convert(made).root["materials"][0]["pbrMetallicRoughness"]["roughnessFactor"] == 1

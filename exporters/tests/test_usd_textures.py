@@ -21,7 +21,7 @@ ENCODED, DECODED = 188, 55
 def card(usd_convert, tmp_path):
     """Convert a card: card(input, file, output, **texture inputs) gives the document, its material."""
 
-    def run(*textures, transforms=(), **surface):
+    def run(*textures, transforms=(), circle=False, **surface):
         made = u.stage()
         u.camera(made)
         prim = u.quad(made, "/World/Card")
@@ -38,6 +38,8 @@ def card(usd_convert, tmp_path):
                     turn.CreateInput(key, kind).Set(value)
                 turn.CreateInput("in", Sdf.ValueTypeNames.Float2).ConnectToSource(source.ConnectableAPI(), "result")
                 source = turn
+            if circle:
+                UsdShade.Shader(made.GetPrimAtPath(f"/World/M/{name}Turn0")).GetInput("in").ConnectToSource(source.ConnectableAPI(), "result")
             node.GetInput("st").ConnectToSource(source.ConnectableAPI(), "result")
         u.bind(prim, material)
         gltf = usd_convert(made)
@@ -171,3 +173,25 @@ def test_images_in_one_have_to_lie_alike(card, tmp_path, first, second):
 def test_black_borders_are_named(card, tmp_path):
     gltf, _ = card(("diffuseColor", grey(tmp_path / "g.png"), "rgb", {"wrapT": "black"}))
     assert gltf.lost_features("/World/M") == ["wrap mode black"]
+
+
+def test_coordinates_that_go_round_in_a_circle_are_named(card, tmp_path):
+    gltf, _ = card(("diffuseColor", grey(tmp_path / "g.png"), "rgb", {}), transforms=({}, {}), circle=True)
+    assert gltf.lost_features("/World/M") == ["texture coordinates that go round in a circle"]
+
+
+@pytest.mark.parametrize("tiles", [(1001,), (1001, 1002), ()])
+def test_udim_tiles(card, tmp_path, tiles):
+    """One tile is an image like any other; of several the first is used, and that is said once."""
+    for tile in tiles:
+        grey(tmp_path / f"g.{tile}.png")
+    gltf, data = card(("diffuseColor", "g.<UDIM>.png", "rgb", {}))
+    assert ("baseColorTexture" in data["pbrMetallicRoughness"]) == bool(tiles)
+    want = {1: [], 2: ["UDIM texture"], 0: ["texture g.<UDIM>.png is missing"]}
+    assert gltf.lost_features("/World/M") == want[len(tiles)]
+
+
+def test_empty_files_are_missing(card, tmp_path):
+    (tmp_path / "e.png").touch()
+    gltf, _ = card(("diffuseColor", "e.png", "rgb", {}))
+    assert [f.endswith("e.png is missing") for f in gltf.lost_features("/World/M")] == [True]

@@ -14,8 +14,13 @@ from pxr import Gf, Usd, UsdShade
 from ..common.document import Document
 from ..common.extras import tidy
 from ..common.report import Lost
-from .readers import Reader, Readers
+from .readers import OUTPUTS, Reader, Readers, fits
 from .textures import Channel, Textures
+
+# MaterialX has the same surface under its own name.
+_PREVIEWS = ("UsdPreviewSurface", "ND_UsdPreviewSurface_surfaceshader")
+# What vertex colours, which multiply glTF's base colour, can stand for.
+_VERTEX_COLOURS = {"diffuseColor": "displayColor", "opacity": "displayOpacity"}
 
 # MaterialX surfaces without a UsdPreviewSurface beside them: input names for what glTF has.
 _MATERIALX = {
@@ -61,7 +66,7 @@ class Materials:
         self._read = Readers(path, self.time, self.lost)
         shader = material.ComputeSurfaceSource()[0]
         shader_id = shader.GetIdAttr().Get() if shader else None
-        if shader_id != "UsdPreviewSurface":
+        if shader_id not in _PREVIEWS:
             for context in ("mtlx", "ri", "mdl"):
                 other = material.ComputeSurfaceSource(context)[0]
                 if not shader and other:
@@ -69,11 +74,12 @@ class Materials:
         if not shader:
             self.lost.add(path, "material without a surface", "it is drawn grey; give it a UsdPreviewSurface")
             return {"name": material.GetPrim().GetName(), "pbrMetallicRoughness": {"baseColorFactor": [0.5, 0.5, 0.5, 1], "metallicFactor": 0}}
-        if material.ComputeDisplacementSource()[0] and _linked(shader, "displacement"):
+        displaced = material.ComputeDisplacementSource()[0]
+        if displaced and (_linked(displaced, "displacement") or self._read.constant(displaced, "displacement")):
             self.lost.add(path, "displacement", "bake it into the mesh or a normal map")
         if shader_id in _MATERIALX:
             return self._materialx(material, shader, _MATERIALX[shader_id])
-        if shader_id != "UsdPreviewSurface":
+        if shader_id not in _PREVIEWS:
             self.lost.add(path, f"{shader_id} shader", "it is drawn grey; give the material a UsdPreviewSurface too")
             return {"name": material.GetPrim().GetName(), "pbrMetallicRoughness": {"baseColorFactor": [0.5, 0.5, 0.5, 1], "metallicFactor": 0}}
         return self._preview(material, shader)
@@ -223,17 +229,18 @@ class Materials:
     def _materialx(self, material: UsdShade.Material, shader: UsdShade.Shader, inputs: tuple[str, ...]) -> dict[str, Any]:
         path = str(material.GetPath())
         self.lost.add(path, "MaterialX surface", "only its plain colour, metal, roughness, ior and transmission are used; give it a UsdPreviewSurface too")
-        colour, metal, rough, ior, transmission, weight = (self._read.constant(shader, name) if name else None for name in inputs)
+        values = [self._read.constant(shader, name) if name else None for name in inputs]
+        colour, metal, rough, ior, transmission, weight = (v if fits(v, (0, 0, 0) if i == 0 else 0) else None for i, v in enumerate(values))
         base = list(colour) if colour is not None else [0.8, 0.8, 0.8]
         scale = 1.0 if weight is None else float(weight)
         pbr = {"baseColorFactor": [*(tidy(min(max(c * scale, 0), 1)) for c in base), 1]}
-        pbr["metallicFactor"] = tidy(metal) if metal is not None else 0
-        pbr["roughnessFactor"] = tidy(rough) if rough is not None else 0.3
+        pbr["metallicFactor"] = tidy(min(max(metal, 0), 1)) if metal is not None else 0
+        pbr["roughnessFactor"] = tidy(min(max(rough, 0), 1)) if rough is not None else 0.3
         out: dict[str, Any] = {"name": material.GetPrim().GetName(), "pbrMetallicRoughness": pbr}
         if ior is not None and ior >= 1:
             self._extension(out, "KHR_materials_ior", {"ior": tidy(ior)})
         if transmission:
-            self._extension(out, "KHR_materials_transmission", {"transmissionFactor": tidy(min(transmission, 1))})
+            self._extension(out, "KHR_materials_transmission", {"transmissionFactor": tidy(min(max(transmission, 0), 1))})
         return out
 
     def _input(self, shader: UsdShade.Shader, name: str, default: Any, path: str) -> Any:
@@ -243,19 +250,18 @@ class Materials:
             return default
         for attribute in UsdShade.Utils.GetValueProducingAttributes(found):
             if UsdShade.Utils.GetType(attribute.GetName()) != UsdShade.AttributeType.Output:
-                value = self._read.at_first_frame(attribute, name)
-                return default if value is None else value
+                return self._read.fitting(self._read.at_first_frame(attribute, name), name, default)
             node = UsdShade.Shader(attribute.GetPrim())
             kind = node.GetIdAttr().Get()
-            if kind == "UsdUVTexture":
-                return self._read.texture(node, attribute.GetBaseName())
+            if kind == "UsdUVTexture" and attribute.GetBaseName() in OUTPUTS:
+                return self._read.texture(node, OUTPUTS[attribute.GetBaseName()])
             if kind and kind.startswith("UsdPrimvarReader"):
                 variable = str(self._read.value(node, "varname", ""))
-                if variable in ("displayColor", "displayOpacity"):
-                    # Vertex colours multiply the base colour in glTF: a factor of 1 gives them alone.
+                if variable == _VERTEX_COLOURS.get(name):
+                    # A factor of 1 gives them alone.
                     self._display = True
                     return Gf.Vec3f(1) if name == "diffuseColor" else 1.0
-                self.lost.add(path, f"{name} from primvar {variable!r}", "only displayColor and displayOpacity are carried; use a texture")
+                self.lost.add(path, f"{name} from primvar {variable!r}", "only diffuseColor from displayColor, opacity from displayOpacity; use a texture")
                 return self._read.value(node, "fallback", default)
             self.lost.add(path, f"{name} from a {kind} node", "only textures and constants are carried; bake it")
             return default

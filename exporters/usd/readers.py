@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from pxr import Usd, UsdShade
+from pxr import Sdf, Usd, UsdShade
 
 from ..common.extras import tidy
 from ..common.report import Lost
@@ -18,6 +18,8 @@ from .textures import Channel, resolved_path
 
 _WRAP = {"repeat": 10497, "mirror": 33648, "clamp": 33071, "black": 33071, "useMetadata": 10497}
 _BLACK_FALLBACK = (0.0, 0.0, 0.0, 1.0)
+# What a UsdUVTexture gives; rgba is no output of the specification's, but written by some.
+OUTPUTS = {"rgb": "rgb", "r": "r", "g": "g", "b": "b", "a": "a", "rgba": "rgb"}
 # glTF counts v from the top.
 _TURNED_OVER = np.array([[1, 0, 0], [0, -1, 1], [0, 0, 1]], float)
 
@@ -37,6 +39,14 @@ class Reader:
         return (self.wrap, self.st, self.transform) == (other.wrap, other.st, other.transform)
 
 
+def fits(value: Any, default: Any) -> bool:
+    """Whether a value is as many numbers as a default is."""
+    try:
+        return np.asarray(value, dtype=float).shape == np.shape(default)
+    except (TypeError, ValueError):
+        return False
+
+
 class Readers:
     """Reads the nodes of one material, which `path` names, at one time."""
 
@@ -52,9 +62,21 @@ class Readers:
         return None
 
     def value(self, shader: UsdShade.Shader, name: str, default: Any) -> Any:
-        """The same with a default."""
+        """The same with a default, which also stands for what is no constant of the default's kind."""
+        found = shader.GetInput(name)
         value = self.constant(shader, name)
-        return default if value is None else value
+        if value is None and found and found.HasConnectedSource():
+            self.lost.add(self.path, f"{name} from a node", "only a constant is carried; its default is used")
+        return self.fitting(value, name, default)
+
+    def fitting(self, value: Any, name: str, default: Any) -> Any:
+        """A value as it is, or the default where it has not as many numbers."""
+        if value is None:
+            return default
+        if isinstance(default, str) or default is None or fits(value, default):
+            return value
+        self.lost.add(self.path, f"{name} of a wrong type", "its default is used; check the material with usdchecker")
+        return default
 
     def at_first_frame(self, attribute: Usd.Attribute, name: str) -> Any:
         """A value that glTF cannot animate, as it is at the start."""
@@ -64,10 +86,7 @@ class Readers:
 
     def texture(self, node: UsdShade.Shader, output: str) -> Reader:
         """The texture node as seen through one of its outputs."""
-        asset = self.value(node, "file", None)
-        name = resolved_path(asset) if asset is not None else ""
-        if "<UDIM>" in name or "<udim>" in name:
-            self.lost.add(self.path, "UDIM texture", "bake the tiles into one image")
+        name = self._file(node)
         scale = tuple(float(x) for x in self.value(node, "scale", (1, 1, 1, 1)))
         bias = tuple(float(x) for x in self.value(node, "bias", (0, 0, 0, 0)))
         space = str(self.value(node, "sourceColorSpace", "auto"))
@@ -79,15 +98,33 @@ class Readers:
         fallback = tuple(float(x) for x in self.value(node, "fallback", _BLACK_FALLBACK))
         return Reader(Channel(name, output, scale, bias, space), wrap, st, transform, fallback)
 
+    def _file(self, node: UsdShade.Shader) -> str:
+        """The resolved path of a texture's file; of UDIM tiles the first one's."""
+        asset = self.value(node, "file", None)
+        if not isinstance(asset, Sdf.AssetPath):
+            return ""
+        if not UsdShade.UdimUtils.IsUdimIdentifier(asset.path):
+            return resolved_path(asset)
+        attribute = UsdShade.Utils.GetValueProducingAttributes(node.GetInput("file"))[0]
+        tiles = UsdShade.UdimUtils.ResolveUdimTilePaths(asset.path, attribute.GetPropertyStack(self.time)[0].layer)
+        if tiles and [tile for _, tile in tiles] != ["1001"]:
+            self.lost.add(self.path, "UDIM texture", "its first tile is used everywhere; bake the tiles into one image")
+        return tiles[0][0] if tiles else asset.path
+
     def _coordinates(self, node: UsdShade.Shader) -> tuple[str, dict[str, Any] | None]:
         """Name of the primvar a texture reads, and all UsdTransform2d on the way to it as one KHR_texture_transform."""
         whole, found, name = np.eye(3), False, "st"
-        current = node.GetInput("st")
+        current, met = node.GetInput("st"), set()
         while current:
             attributes = UsdShade.Utils.GetValueProducingAttributes(current)
             source = UsdShade.Shader(attributes[0].GetPrim()) if attributes else None
             kind = source.GetIdAttr().Get() if source else None
-            if kind == "UsdTransform2d":
+            if kind == "UsdTransform2d" and source.GetPath() in met:
+                self.lost.add(
+                    self.path, "texture coordinates that go round in a circle", "they are used as they are; connect them to a UsdPrimvarReader_float2"
+                )
+            elif kind == "UsdTransform2d":
+                met.add(source.GetPath())
                 # The nodes are met from the texture backwards: the last one met is applied first.
                 whole, found = whole @ self._transform(source), True
                 current = source.GetInput("in")

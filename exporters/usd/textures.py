@@ -40,11 +40,11 @@ class Channel:
 
 
 def open_asset(resolved: str) -> bytes | None:
-    """The bytes of a resolved asset path, inside a package too."""
+    """The bytes of a resolved asset path, inside a package too; None if there are none."""
     asset = Ar.GetResolver().OpenAsset(Ar.ResolvedPath(resolved)) if resolved else None
-    if not asset:
-        return None
-    return bytes(asset.GetBuffer())
+    # A file of no bytes has no buffer.
+    buffer = asset.GetBuffer() if asset else None
+    return bytes(buffer) if buffer else None
 
 
 class Textures:
