@@ -13,7 +13,7 @@ import pytest
 pytest.importorskip("pxr", reason="SKIPPED LOUDLY: usd-core is not installed (pip install usd-core)")
 import usd_scene as u
 from PIL import Image
-from pxr import UsdGeom, UsdLux
+from pxr import Sdf, UsdGeom, UsdLux
 
 SCRIPT = Path(__file__).resolve().parents[1] / "usd" / "usd_to_gltf.py"
 
@@ -117,6 +117,63 @@ def test_light_linking_is_named(usd_convert):
     gltf = usd_convert(made)
     assert [gltf.lost_features(f"/World/{n}") for n in ("Only", "AllBut", "Shadow", "Dome")] == [["light linking"]] * 4
     assert not gltf.lost_features("/World/Free")
+
+
+def test_a_sun_all_over_the_sky(usd_convert):
+    made = u.stage()
+    u.camera(made)
+    UsdLux.DistantLight.Define(made, "/World/Light").CreateAngleAttr(180.0)
+    assert usd_convert(made).light("Light")[1]["extras"]["angle"] == pytest.approx(math.pi)
+
+
+@pytest.mark.parametrize(("name", "value"), [("intensity", math.nan), ("exposure", 5000.0), ("radius", math.inf)])
+def test_lights_that_are_no_numbers_are_named(usd_convert, name, value):
+    made = u.stage()
+    u.camera(made)
+    UsdLux.SphereLight.Define(made, "/World/Light").GetPrim().GetAttribute(f"inputs:{name}").Set(value)
+    UsdLux.SphereLight.Define(made, "/World/Other")
+    gltf = usd_convert(made)
+    assert gltf.lost_features("/World/Light") == ["light whose brightness or size is no usable number"]
+    assert len(gltf.root["extensions"]["KHR_lights_punctual"]["lights"]) == 1
+
+
+def test_values_of_a_wrong_type_are_as_if_absent(usd_convert):
+    made = u.stage()
+    u.camera(made)
+    UsdLux.SphereLight.Define(made, "/World/Light")
+    spec = made.GetRootLayer().GetPrimAtPath("/World/Light")
+    Sdf.AttributeSpec(spec, "inputs:intensity", Sdf.ValueTypeNames.String).default = "much"
+    found = usd_convert(made).light("Light")[1]
+    assert found["intensity"] == pytest.approx(683 * math.pi / 4)
+
+
+@pytest.mark.parametrize(
+    ("kind", "scale", "named"),
+    [("SphereLight", (1, 2, 1), True), ("SphereLight", (2, 2, 2), False), ("CylinderLight", (3, 1, 1), False), ("DiskLight", (1, 2, 1), False)],
+)
+def test_round_lights_scaled_unevenly_are_named(usd_convert, kind, scale, named):
+    made = u.stage()
+    u.camera(made)
+    light = getattr(UsdLux, kind).Define(made, "/World/Light")
+    UsdGeom.XformCommonAPI(light).SetScale(scale)
+    assert ("round light that is scaled unevenly" in usd_convert(made).lost_features("/World/Light")) == named
+
+
+def test_shadow_colours_are_named(usd_convert):
+    made = u.stage()
+    u.camera(made)
+    light = UsdLux.SphereLight.Define(made, "/World/Light")
+    UsdLux.ShadowAPI.Apply(light.GetPrim()).CreateShadowColorAttr((1, 0, 0))
+    assert usd_convert(made).lost_features("/World/Light") == ["shadow colour or distance"]
+
+
+def test_shapes_that_are_lights_are_drawn_and_named(usd_convert):
+    made = u.stage()
+    u.camera(made)
+    UsdLux.LightAPI.Apply(UsdGeom.Sphere.Define(made, "/World/Ball").GetPrim())
+    gltf = usd_convert(made)
+    assert "mesh" in gltf.root["nodes"][gltf.node("Ball")]
+    assert gltf.lost_features("/World/Ball") == ["mesh light"]
 
 
 def test_names_that_look_like_uris(usd_convert, buzz, tmp_path):

@@ -21,10 +21,17 @@ from ..common.motion import Animation, unscaled
 from ..common.report import Lost
 from . import exr
 from .output import Output
+from .readers import fits
 from .textures import open_asset, resolved_path
 
 _PUNCTUAL = ("SphereLight", "RectLight", "DiskLight", "CylinderLight", "DistantLight")
+# The axes across which a light has one radius.
+_ROUND = {"SphereLight": slice(0, 3), "CylinderLight": slice(1, 3)}
 _HALF_PI = math.pi / 2
+# A sun all over the sky; seven digits, as it is written, that are not above pi.
+_WIDEST = 3.141592
+# Beyond it single precision, which glTF has, soon ends.
+_BRIGHTEST = 1e30
 
 
 def is_light(prim: Usd.Prim) -> bool:
@@ -45,11 +52,15 @@ class LightTrack:
     poses: list[np.ndarray] = field(default_factory=list)
     values: list[dict[str, float]] = field(default_factory=list)
     visible: list[bool] = field(default_factory=list)
+    # Whether a round light is ever scaled to what is not round.
+    uneven: bool = False
 
     def sample(self, time: Usd.TimeCode, world: np.ndarray, visible: bool, units: float) -> None:
         """Record the light; `world` is its matrix in glTF's space, `units` metres per stage unit."""
         scale = np.linalg.norm(world[:3, :3], axis=0)
         self.values.append(_values(self.prim, time, scale, units))
+        across = scale[_ROUND[self.prim.GetTypeName()]] if self.prim.GetTypeName() in _ROUND else scale[:1]
+        self.uneven |= bool(np.ptp(across) > 1e-3 * across.max())
         self.poses.append(unscaled(world))
         self.visible.append(visible)
 
@@ -62,7 +73,12 @@ class LightTrack:
             return
         if not any(self.visible):
             return
+        if not (np.abs([list(v.values()) for v in self.values]) < _BRIGHTEST).all():
+            lost.add(path, "light whose brightness or size is no usable number", "it does not shine; check its intensity, exposure and size")
+            return
         _warn(self.prim, lost)
+        if self.uneven:
+            lost.add(path, "round light that is scaled unevenly", "it stays round; scale it evenly, or use a disk light")
         values = {k: np.array([v[k] for v in self.values]) for k in self.values[0]}
         first = self.values[0]
         spot = "outer" in first
@@ -109,9 +125,11 @@ class LightTrack:
 
 
 def _get(prim: Usd.Prim, name: str, time: Usd.TimeCode, default: Any) -> Any:
+    """An attribute's value; where it has none, or one of a wrong type, what it is without."""
     attribute = prim.GetAttribute(name)
     value = attribute.Get(time) if attribute else None
-    return default if value is None else value
+    numbers = not isinstance(default, str) and default is not None
+    return default if value is None or (numbers and not fits(value, default)) else value
 
 
 def radiance(prim: Usd.Prim, time: Usd.TimeCode) -> np.ndarray:
@@ -120,7 +138,7 @@ def radiance(prim: Usd.Prim, time: Usd.TimeCode) -> np.ndarray:
     if _get(prim, "inputs:enableColorTemperature", time, False):
         colour = colour * np.array(UsdLux.BlackbodyTemperatureAsRgb(_get(prim, "inputs:colorTemperature", time, 6500.0)))
     fallback = 50000.0 if prim.GetTypeName() == "DistantLight" else 1.0
-    strength = float(_get(prim, "inputs:intensity", time, fallback)) * 2 ** float(_get(prim, "inputs:exposure", time, 0.0))
+    strength = float(_get(prim, "inputs:intensity", time, fallback)) * 2 ** min(float(_get(prim, "inputs:exposure", time, 0.0)), 1000.0)
     return np.maximum(colour * strength, 0)
 
 
@@ -134,7 +152,7 @@ def _values(prim: Usd.Prim, time: Usd.TimeCode, scale: np.ndarray, units: float)
         angle = math.radians(max(float(_get(prim, "inputs:angle", time, 0.53)), 0.0))
         spread = math.pi * math.sin(min(angle / 2, _HALF_PI)) ** 2
         factor = 1.0 if normalize or spread == 0 else spread
-        out["angle"] = min(angle, math.pi)
+        out["angle"] = min(angle, _WIDEST)
     elif kind in ("RectLight", "DiskLight"):
         if kind == "RectLight":
             width, height = (float(_get(prim, f"inputs:{k}", time, 1.0)) for k in ("width", "height"))
@@ -164,7 +182,7 @@ def _values(prim: Usd.Prim, time: Usd.TimeCode, scale: np.ndarray, units: float)
         out |= {"outer": outer, "inner": max(min(outer * (1 - soft), outer - 1e-4), 0.0)}
     total = light * factor * LUMENS_PER_WATT
     peak = float(total.max())
-    colour = total / peak if peak > 0 else np.ones(3)
+    colour = total / peak if 0 < peak < math.inf else np.ones(3)
     return out | dict(zip("rgb", map(float, colour), strict=True)) | {"intensity": peak}
 
 
@@ -186,8 +204,11 @@ def _warn(prim: Usd.Prim, lost: Lost) -> None:
             lost.add(path, "IES profile", "use shaping:cone instead")
         if kind != "SphereLight" and _get(prim, "inputs:shaping:cone:angle", now, 90.0) < 90:
             lost.add(path, "shaping of an area light", "it shines over the whole half space; use a sphere light for a beam")
-    if prim.HasAPI(UsdLux.ShadowAPI) and not _get(prim, "inputs:shadow:enable", now, True):
-        lost.add(path, "light without shadows", "it casts shadows here")
+    if prim.HasAPI(UsdLux.ShadowAPI):
+        if not _get(prim, "inputs:shadow:enable", now, True):
+            lost.add(path, "light without shadows", "it casts shadows here")
+        elif any(_get(prim, "inputs:shadow:color", now, (0, 0, 0))) or _get(prim, "inputs:shadow:distance", now, -1.0) >= 0:
+            lost.add(path, "shadow colour or distance", "its shadows are black and as long as they are")
     _warn_of_links(prim, lost)
 
 
@@ -223,7 +244,10 @@ def write_dome(prim: Usd.Prim, time: Usd.TimeCode, world: np.ndarray, up: str, o
     path = str(prim.GetPath())
     _warn_of_links(prim, lost)
     light = radiance(prim, time)
-    strength = max(float(light.max()), 0.0)
+    if not (light < _BRIGHTEST).all():
+        lost.add(path, "light whose brightness is no usable number", "the sky is black; check its intensity and exposure")
+        light = np.zeros(3)
+    strength = float(light.max())
     out: dict[str, Any] = {"color": [tidy(c / strength) if strength else 0 for c in light], "strength": tidy(strength)}
     asset = _get(prim, "inputs:texture:file", time, None)
     if asset is None or not asset.path:

@@ -73,7 +73,7 @@ class Walker:
             return "camera"
         if is_dome(prim):
             return "dome"
-        if is_light(prim) and not prim.IsA(UsdGeom.Mesh):
+        if is_light(prim) and not prim.IsA(UsdGeom.Gprim):
             return "light"
         kinds = {"mesh": prim.IsA(UsdGeom.Mesh), "instancer": prim.IsA(UsdGeom.PointInstancer), "gprim": is_gprim(prim)}
         shape = next((kind for kind, so in kinds.items() if so), None)
@@ -86,7 +86,7 @@ class Walker:
             if name in _NAMED:
                 self.lost.add(str(prim.GetPath()), str(name), f"it is left out; {_NAMED[name]}")
                 return None
-            if prim.HasAPI("MeshLightAPI"):
+            if is_light(prim):
                 self.lost.add(str(prim.GetPath()), "mesh light", "it does not shine; give it an emissive material and add a rect light")
             if shape == "instancer":
                 self._name_colours(prim)
