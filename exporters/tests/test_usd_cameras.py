@@ -105,6 +105,30 @@ def test_range_from_samples(usd_convert):
     assert (gltf.buzz["frame_start"], gltf.buzz["frame_end"]) == (10, 20)
 
 
+def test_range_from_splines(usd_convert):
+    from pxr import Ts
+
+    made = u.stage(frames=None)
+    curve = Ts.Spline("double")
+    for time, value in ((10, 0.0), (20, 8.0)):
+        knot = Ts.Knot(time=time, value=value, nextInterp=Ts.InterpLinear)
+        curve.SetKnot(knot)
+    u.camera(made).AddTranslateXOp().GetAttr().SetSpline(curve)
+    gltf = usd_convert(made)
+    assert (gltf.buzz["frame_start"], gltf.buzz["frame_end"]) == (10, 20)
+    assert gltf.world(gltf.camera_at(10), 15)[0, 3] == pytest.approx(4)
+
+
+@pytest.mark.parametrize("rate", [-24.0, math.nan, math.inf, 1e-9])
+def test_rates_that_are_no_numbers_are_one_clear_error(usd_convert, rate):
+    from exporters.common.report import InputError
+
+    made = u.stage(rate=rate)
+    u.camera(made)
+    with pytest.raises(InputError, match="timeCodesPerSecond is"):
+        usd_convert(made)
+
+
 @pytest.mark.parametrize(
     ("codes", "rate", "span", "frames"),
     [(24.0, 23.976, (1, 12), (1, 12)), (24.0, 24.0, (0.75, 4.25), (1, 5)), (1000.0, 24.0, (10, 1000), (1, 24)), (24.0, 24.0, (-2.5, 0), (-2, 0))],
@@ -162,6 +186,16 @@ def test_settings_without_pixels_are_one_clear_error(usd_convert, name, value):
     settings.GetPrim().GetAttribute(name).Set(value)
     with pytest.raises(InputError, match=f"/Render/Settings: .*{name}"):
         usd_convert(made)
+
+
+@pytest.mark.parametrize("settings", ["text", {"boundCamera": "/World/B"}, {"boundCamera": "/Viewer"}, {}])
+def test_the_camera_bound_in_a_viewer(usd_convert, settings):
+    made = u.stage()
+    u.camera(made, "/World/A")
+    u.camera(made, "/World/B")
+    made.GetRootLayer().customLayerData = {"cameraSettings": settings}
+    want = "/World/B" if settings == {"boundCamera": "/World/B"} else "/World/A"
+    assert usd_convert(made).buzz["cuts"][0]["camera"] == want
 
 
 def test_chosen_camera(usd_convert):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
 
 pytest.importorskip("pxr", reason="SKIPPED LOUDLY: usd-core is not installed (pip install usd-core)")
@@ -95,3 +96,43 @@ def test_instances_in_a_model(usd_convert, tmp_path):
     gltf = usd_convert(made)
     assert moves(gltf) == [True, False, False]
     assert len({n["mesh"] for n in gltf.root["nodes"] if n.get("name") == "Hat"}) == 1
+
+
+@pytest.mark.parametrize(
+    ("codes", "rate", "span", "frames"), [(24, 24, True, None), (60, 60, True, None), (1000, 24, True, None), (30, 30, False, None), (24, 24, True, (3, 20))]
+)
+def test_joints_turn_between_their_keys(usd_convert, codes, rate, span, frames):
+    """Two keys a second apart: a quarter turn, at the stage's speed, with the range in the stage, in its keys, or asked for."""
+    made = u.stage(frames=(0, codes if frames is None else 1) if span else None, rate=codes)
+    made.SetFramesPerSecond(rate)
+    u.camera(made)
+    model(made, "/World/Actor")
+    animation = UsdSkel.Animation(made.GetPrimAtPath("/World/Actor/Model/Skel/Anim"))
+    animation.GetTranslationsAttr().Clear()
+    animation.CreateTranslationsAttr([Gf.Vec3f(0)])
+    for code, angle in ((0, 0), (codes, 90)):
+        animation.CreateRotationsAttr().Set([Gf.Quatf(Gf.Rotation(Gf.Vec3d(0, 0, 1), angle).GetQuat())], code)
+    gltf = usd_convert(made, frames=frames)
+    for frame in (3, rate // 2, 20):
+        angle = np.pi / 2 * frame / rate
+        want = (np.sin(angle) - np.cos(angle), -np.sin(angle) - np.cos(angle), 0)
+        np.testing.assert_allclose(gltf.posed_points(gltf.node("Card"), frame)[0], want, atol=1e-4)
+
+
+def test_skins_that_cannot_be_baked_are_named(usd_convert, capfd):
+    """By what UsdSkel says of them, which stands nowhere else."""
+    made = u.stage(frames=(1, 3))
+    u.camera(made)
+    model(made, "/World/Actor")
+    UsdSkel.BindingAPI(made.GetPrimAtPath("/World/Actor/Model/Card")).GetJointWeightsPrimvar().Set([1.0] * 3)
+    gltf = usd_convert(made)
+    assert gltf.lost_features("/World/Actor/Model") == ["skinning: Size of jointIndices [4] != size of jointWeights [3]."]
+    assert "jointWeights" not in capfd.readouterr().err
+
+
+def test_skeletons_that_do_not_exist_are_named(usd_convert):
+    made = u.stage(frames=(1, 3))
+    u.camera(made)
+    model(made, "/World/Actor")
+    UsdSkel.BindingAPI(made.GetPrimAtPath("/World/Actor/Model/Card")).GetSkeletonRel().SetTargets(["/World/Gone"])
+    assert any("/World/Gone" in f for f in usd_convert(made).lost_features("/World/Actor/Model/Card"))

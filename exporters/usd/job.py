@@ -20,7 +20,7 @@ from .materials import Materials
 from .output import Output
 from .shapes import Geometries
 from .skins import bake_skins
-from .stage import open_stage, reason
+from .stage import Said, open_stage, reason
 from .textures import Textures
 from .tracks import Track, distinct, stands_still
 from .walk import Found, Walker
@@ -71,6 +71,7 @@ class _Conversion:
         self.source, self.output, self.options = Path(source), output, options
         self.lost = Lost()
         self.stage = open_stage(self.source, options.variants, self.lost)
+        self.said = Said()
         self.up = UsdGeom.GetStageUpAxis(self.stage)
         self.units = UsdGeom.GetStageMetersPerUnit(self.stage)
         if not (0 < self.units < 1e9):
@@ -79,18 +80,18 @@ class _Conversion:
         self.root[:3, :3] *= self.units
         if self.up == UsdGeom.Tokens.z:
             self.root = self.root @ np.array([[1, 0, 0, 0], [0, 0, 1, 0], [0, -1, 0, 0], [0, 0, 0, 1]], float)
-        codes = extras.rational(self.stage.GetTimeCodesPerSecond() or 24.0)
+        codes = self._rate("timeCodesPerSecond", self.stage.GetTimeCodesPerSecond() or 24.0)
         rated = self.stage.HasAuthoredMetadata("framesPerSecond") and self.stage.GetFramesPerSecond() > 0
-        self.fps = extras.rational(self.stage.GetFramesPerSecond()) if rated else codes
+        self.fps = self._rate("framesPerSecond", self.stage.GetFramesPerSecond()) if rated else codes
         self.codes_per_frame = codes[0] * self.fps[1] / (codes[1] * self.fps[0])
         self._settings()
-        bake_skins(self.stage, self.lost, options.progress)
-        self.walker = Walker(self.stage, self.lost)
         self.frames = options.frames or self._range()
         if self.frames[1] < self.frames[0]:
             raise InputError(f"frame range {self.frames[0]}-{self.frames[1]}: the last frame is before the first")
         if self.frames[1] - self.frames[0] > _LONGEST:
             raise InputError(f"frame range {self.frames[0]}-{self.frames[1]}: longer than {_LONGEST} frames; pass --frames FIRST-LAST")
+        bake_skins(self.stage, [frame * self.codes_per_frame for frame in self.frames], self.lost, self.said, options.progress)
+        self.walker = Walker(self.stage, self.lost)
         self.tracks: dict[tuple, Track] = {}
         # What never changes has one sample.
         self.still: set[tuple] = set()
@@ -101,6 +102,11 @@ class _Conversion:
         self.domes: dict[tuple, DomeTrack] = {}
         self.geometry = Geometries(options.levels, self.lost)
         self.taken: list[float] = []
+
+    def _rate(self, name: str, rate: float) -> tuple[int, int]:
+        if not 1e-3 <= rate <= 1e6:
+            raise InputError(f"{self.source}: {name} is {rate}; it must be a number over 0, such as 24")
+        return extras.rational(rate)
 
     def _settings(self) -> None:
         """Resolution, pixel aspect, policy and camera from RenderSettings, overridden by their first product."""
@@ -132,7 +138,8 @@ class _Conversion:
     def _range(self) -> tuple[int, int]:
         times = [self.stage.GetStartTimeCode(), self.stage.GetEndTimeCode()]
         if not self.stage.HasAuthoredTimeCodeRange():
-            times = [t for prim in Usd.PrimRange.Stage(self.stage) for a in prim.GetAuthoredAttributes() for t in a.GetTimeSamples()]
+            attributes = [a for prim in Usd.PrimRange.Stage(self.stage) for a in prim.GetAuthoredAttributes()]
+            times = [t for a in attributes for t in (a.GetSpline().GetKnots().keys() if a.HasSpline() else a.GetTimeSamples())]
         if not all(math.isfinite(t) for t in times):
             raise InputError(f"{self.source}: its time codes are no numbers; pass --frames FIRST-LAST")
         frames = [round(t / self.codes_per_frame, 6) for t in times]
@@ -185,6 +192,7 @@ class _Conversion:
         if world is None and not self.lights and self.options.camera_light:
             self._camera_light(document, animation, cuts)
         animation.close()
+        self.said.into(self.lost, self.source.name, "USD", "something may be missing from the picture; check the stage with usdchecker")
         self._finish(document, world, cuts)
         return Result(self.output.target, self.lost, document.root)
 
@@ -265,7 +273,8 @@ class _Conversion:
                 raise InputError(f"camera {wanted}: the stage has {', '.join(known) or 'none'}")
             wanted = near[0]
         if wanted is None:
-            bound = self.stage.GetRootLayer().customLayerData.get("cameraSettings", {}).get("boundCamera")
+            settings = self.stage.GetRootLayer().customLayerData.get("cameraSettings")
+            bound = settings.get("boundCamera") if isinstance(settings, dict) else None
             moving = next((p for p, t in tracks.items() if motion.varies(np.array(t.poses))), None)
             wanted = bound if bound in tracks else moving or next(iter(known), None)
         if wanted in self.flaws:

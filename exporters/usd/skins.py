@@ -7,10 +7,11 @@ from collections.abc import Callable
 from pxr import Sdf, Usd, UsdSkel
 
 from ..common.report import Lost
+from .stage import Said
 
 
-def bake_skins(stage: Usd.Stage, lost: Lost, progress: Callable[[str], None]) -> None:
-    """Bake every skinned mesh, instances made prims of their own where they hold one."""
+def bake_skins(stage: Usd.Stage, span: list[float], lost: Lost, said: Said, progress: Callable[[str], None]) -> None:
+    """Bake every skinned mesh over a span of time codes, instances made prims of their own where they hold one."""
     while held := _instances_with_skins(stage):
         # Baking writes points, which instances of one prototype cannot have of their own. Others may lie in these.
         for path in held:
@@ -18,9 +19,15 @@ def bake_skins(stage: Usd.Stage, lost: Lost, progress: Callable[[str], None]) ->
     roots = [p for p in stage.Traverse() if p.IsA(UsdSkel.Root)]
     if roots:
         progress(f"baking {len(roots)} skinned models")
+        # UsdSkel bakes each frame of the stage's own range, and elsewhere only where there are keys: between these, points would go straight.
+        stage.SetStartTimeCode(span[0])
+        stage.SetEndTimeCode(span[1])
     for root in roots:
-        if not UsdSkel.BakeSkinning(Usd.PrimRange(root)):
-            lost.add(str(root.GetPath()), "skinning", "UsdSkel could not bake it; it stands in its rest pose")
+        path, missing = str(root.GetPath()), len(lost.items)
+        baked = UsdSkel.BakeSkinning(Usd.PrimRange(root))
+        said.into(lost, path, "skinning", "what it is about may stand in its rest pose; check it with usdchecker")
+        if not baked and len(lost.items) == missing:
+            lost.add(path, "skinning", "UsdSkel could not bake it; it stands in its rest pose")
 
 
 def _instances_with_skins(stage: Usd.Stage) -> set[Sdf.Path]:

@@ -15,6 +15,23 @@ def reason(error: object) -> str:
     return " ".join(str(error).split()).rsplit(" : ", 1)[-1].strip("' ")
 
 
+class Said:
+    """What USD warns of, which would otherwise stand on the terminal for nobody in particular."""
+
+    def __init__(self) -> None:
+        self._delegate = UsdUtils.CoalescingDiagnosticDelegate()
+
+    def into(self, lost: Lost, name: str, feature: str, action: str) -> None:
+        """Name what was said since the last time; `name` is the object where the words have none."""
+        for said in self._delegate.TakeUncoalescedDiagnostics():
+            # What cannot be composed is named when the stage is opened, and said again at every change.
+            if "WARNING" in said.diagnosticCodeString and not said.sourceFunction.endswith("_ReportErrors"):
+                text = " ".join(said.commentary.split())
+                where = re.search(r"<(/[^<>.]+)|^(/[^ .]+)", text)
+                object_ = (where[1] or where[2]) if where else name
+                lost.add(object_, f"{feature}: {text.removeprefix(f'{object_} -- ')[:200]}", action)
+
+
 def open_stage(source: Path, variants: list[tuple[str, str, str]], lost: Lost) -> Usd.Stage:
     """Open a stage with variants chosen in its session layer, which is never saved."""
     if not Path(source).is_file():
@@ -30,6 +47,8 @@ def open_stage(source: Path, variants: list[tuple[str, str, str]], lost: Lost) -
         delegate.TakeUncoalescedDiagnostics()
         del delegate
     stage.SetEditTarget(stage.GetSessionLayer())
+    # Its times are those of the stage; a layer that says nothing has 24 codes a second, and what is baked into it would play at another speed.
+    stage.SetTimeCodesPerSecond(stage.GetTimeCodesPerSecond())
     for path, name, choice in variants:
         prim = stage.GetPrimAtPath(path) if path else stage.GetDefaultPrim()
         owners = [prim] if prim and name in prim.GetVariantSets().GetNames() else []
