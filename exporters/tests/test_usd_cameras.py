@@ -267,3 +267,17 @@ def test_frames_per_second(usd_convert, rate, codes):
     assert (gltf.buzz["frame_start"], gltf.buzz["frame_end"]) == (0, last)
     assert gltf.world(gltf.camera_at(0), 12)[0, 3] == pytest.approx(12 * 24 / rate, abs=1e-4)
     assert gltf.buzz["shutter"] == pytest.approx(0.5, rel=1e-5)
+
+
+def test_what_a_lens_has_that_is_not_carried_is_named(usd_convert):
+    """Clipping planes, a near plane behind an orthographic camera, a stop that opens late."""
+    made = u.stage()
+    u.camera(made, clippingPlanes=[Gf.Vec4f(0, 0, 1, -2)])
+    u.camera(made, "/World/Flat", projection="orthographic", clippingRange=Gf.Vec2f(-5, 5))
+    late = u.camera(made, "/World/Late").GetFStopAttr()
+    late.Set(0.0, 1)
+    late.Set(2.8, 5)
+    gltf = usd_convert(made)
+    assert gltf.lost_features("/World/Camera") == ["clipping planes"]
+    assert gltf.lost_features("/World/Flat") == ["near plane behind the camera"]
+    assert gltf.lost_features("/World/Late") == ["depth of field"]

@@ -138,3 +138,74 @@ def test_missing_references_are_named(usd_convert):
     UsdGeom.Xform.Define(made, "/World/Gone").GetPrim().GetReferences().AddReference("gone.usda")
     gltf = usd_convert(made)
     assert any("composition" in i["feature"] and "gone.usda" in i["feature"] for i in gltf.lost.items)
+
+
+@pytest.mark.parametrize(
+    ("kind", "seen"), [("BasisCurves", True), ("BasisCurves", False), ("ParticleField3DGaussianSplat", True), ("GenerativeProcedural", True)]
+)
+def test_what_cannot_be_drawn_is_named_where_it_would_be_seen(usd_convert, kind, seen):
+    made = u.stage()
+    u.camera(made)
+    prim = UsdGeom.Imageable(made.DefinePrim("/World/Thing", kind))
+    if not seen:
+        prim.MakeInvisible()
+    assert usd_convert(made).lost_features("/World/Thing") == [kind] * seen
+
+
+def test_types_that_usd_does_not_know_are_named(usd_convert):
+    """Where they look like something to draw; settings of other programs do not."""
+    made = u.stage()
+    u.camera(made)
+    made.DefinePrim("/World/Fur", "StudioFur").CreateAttribute("points", Sdf.ValueTypeNames.Point3fArray).Set([(0, 0, 0)])
+    made.DefinePrim("/World/Info", "StudioInfo")
+    gltf = usd_convert(made)
+    assert gltf.lost_features("/World/Fur") == ["StudioFur, a type that USD does not know here"]
+    assert not gltf.lost_features("/World/Info")
+
+
+def test_draw_modes_are_named(usd_convert):
+    made = u.stage()
+    u.camera(made)
+    Usd.ModelAPI(made.GetPrimAtPath("/World")).SetKind("group")
+    for name, mode in (("Cards", "cards"), ("Full", "default")):
+        prim = UsdGeom.Xform.Define(made, f"/World/{name}").GetPrim()
+        Usd.ModelAPI(prim).SetKind("component")
+        UsdGeom.ModelAPI.Apply(prim).CreateModelDrawModeAttr(mode)
+        u.quad(made, f"/World/{name}/Card")
+    gltf = usd_convert(made)
+    assert gltf.lost_features("/World/Cards") == ["model:drawMode cards"]
+    assert not gltf.lost_features("/World/Full")
+
+
+@pytest.mark.parametrize(("place", "drawn", "lost"), [("over", 2, []), ("hidden", 2, []), ("class", 0, ["prototype /Protos/Card that is a class"])])
+def test_prototypes_elsewhere(usd_convert, place, drawn, lost):
+    """Instances are seen though the place of their prototype is not; USD draws no classes."""
+    made = u.stage()
+    u.camera(made)
+    u.quad(made, "/Protos/Card")
+    made.GetPrimAtPath("/Protos").SetSpecifier({"over": Sdf.SpecifierOver, "class": Sdf.SpecifierClass}.get(place, Sdf.SpecifierDef))
+    if place == "hidden":
+        UsdGeom.Scope.Define(made, "/Protos").CreateVisibilityAttr("invisible")
+    instancer = UsdGeom.PointInstancer.Define(made, "/World/Many")
+    instancer.CreatePrototypesRel().SetTargets(["/Protos/Card"])
+    instancer.CreateProtoIndicesAttr([0, 0])
+    instancer.CreatePositionsAttr([(0, 0, 0), (3, 0, 0)])
+    gltf = usd_convert(made)
+    assert len(named(gltf, "Card")) == drawn
+    assert gltf.lost_features("/World/Many") == lost
+
+
+def test_a_dome_in_a_prototype_is_named(usd_convert):
+    from pxr import UsdLux
+
+    made = u.stage()
+    u.camera(made)
+    UsdLux.DomeLight.Define(made, "/World/Many/Proto/Sky")
+    u.quad(made, "/World/Many/Proto/Card")
+    instancer = UsdGeom.PointInstancer.Define(made, "/World/Many")
+    instancer.CreatePrototypesRel().SetTargets(["/World/Many/Proto"])
+    instancer.CreateProtoIndicesAttr([0, 0])
+    instancer.CreatePositionsAttr([(0, 0, 0), (3, 0, 0)])
+    gltf = usd_convert(made)
+    assert gltf.lost_features("/World/Many/Proto/Sky") == ["dome light in a prototype"]
+    assert len(named(gltf, "Card")) == 2

@@ -67,8 +67,12 @@ class CameraTrack:
         values = {k: np.array([lens[k] for lens in self.lens]) for k in first}
         if np.abs(values["exposure"] - 1).max() > 1e-6:
             lost.add(path, "exposure", "the picture is as bright as at exposure 0; expose it in compositing")
+        if UsdGeom.Camera(self.prim).GetClippingPlanesAttr().Get(Usd.TimeCode.EarliestTime()):
+            lost.add(path, "clipping planes", "nothing is cut away by them; cut the objects, or use clippingRange")
         kind = "orthographic" if ortho else "perspective"
         near, far = float(first["near"]), float(first["far"])
+        if ortho and values["near"].min() < 0:
+            lost.add(path, "near plane behind the camera", "what is behind it is not seen; move the camera back")
         body: dict[str, Any]
         if ortho:
             body = {"xmag": float(first["xmag"]), "ymag": float(first["ymag"]), "znear": max(near, 0.0), "zfar": max(far, near + 1)}
@@ -81,7 +85,7 @@ class CameraTrack:
             extras["shift"] = [float(first["shift_x"]), float(first["shift_y"])]
         if not ortho:
             extras["sensor"] = [tidy(first["width"]), tidy(first["height"])]
-        if first["fstop"] > 0:
+        if values["fstop"].max() > 0:
             extras["dof"] = {"focus_distance": tidy(first["focus"]), "fstop": tidy(first["fstop"]), "focal_length": tidy(first["focal"])}
             lost.add(path, "depth of field", "it is not rendered; use depth.Z in compositing")
         index = document.append("cameras", {"type": kind, kind: body, "name": self.prim.GetName(), "extras": extras})

@@ -20,6 +20,9 @@ _NAMED = {
     "Points": "convert it to a mesh or a PointInstancer",
     "TetMesh": "convert its surface to a mesh",
     "Volume": "render it separately",
+    "ParticleField": "convert it to a mesh",
+    "ParticleField3DGaussianSplat": "convert it to a mesh",
+    "GenerativeProcedural": "write out what it makes",
 }
 _DEEPEST = 8
 _PURPOSES = (UsdGeom.Tokens.default_, UsdGeom.Tokens.render)
@@ -63,11 +66,13 @@ class Walker:
         for prim in walk:
             if prim.IsA(UsdGeom.PointInstancer):
                 walk.PruneChildren()
-            kind = self._kind(prim)
-            if kind and (prim.IsDefined() or root != self.stage.GetPseudoRoot()):
+            if not prim.IsDefined() and root.IsPseudoRoot():
+                continue
+            self._name_model(prim)
+            if kind := self._kind(prim, root):
                 yield kind, prim
 
-    def _kind(self, prim: Usd.Prim) -> str | None:
+    def _kind(self, prim: Usd.Prim, root: Usd.Prim) -> str | None:
         name = prim.GetTypeName()
         if prim.IsA(UsdGeom.Camera):
             return "camera"
@@ -84,13 +89,29 @@ class Walker:
             if purpose != UsdGeom.Tokens.render and prim.GetAttribute("renderVisibility").Get() == UsdGeom.Tokens.invisible:
                 self.lost.add(str(prim.GetPath()), "renderVisibility without purpose render", "USD heeds it for that purpose only: it is drawn; set visibility")
             if name in _NAMED:
-                self.lost.add(str(prim.GetPath()), str(name), f"it is left out; {_NAMED[name]}")
+                if not root.IsPseudoRoot() or not self._never_seen(prim):
+                    self.lost.add(str(prim.GetPath()), str(name), f"it is left out; {_NAMED[name]}")
                 return None
             if is_light(prim):
                 self.lost.add(str(prim.GetPath()), "mesh light", "it does not shine; give it an emissive material and add a rect light")
             if shape == "instancer":
                 self._name_colours(prim)
+        elif name and not prim.GetPrimTypeInfo().GetSchemaType() and (prim.HasAttribute("points") or prim.HasAttribute("extent")):
+            self.lost.add(str(prim.GetPath()), f"{name}, a type that USD does not know here", "it is left out; convert it to a mesh")
         return shape
+
+    def _never_seen(self, prim: Usd.Prim) -> bool:
+        """Whether a prim is invisible at all times: nothing of it can be lost."""
+        return not self._changes(prim) and not _visible(UsdGeom.Imageable(prim), Usd.TimeCode.EarliestTime())
+
+    def _name_model(self, prim: Usd.Prim) -> None:
+        """Name a model that viewers draw as something simpler."""
+        if prim.IsModel() and prim.HasAPI(UsdGeom.ModelAPI):
+            api = UsdGeom.ModelAPI(prim)
+            mode = api.ComputeModelDrawMode()
+            applied = api.GetModelApplyDrawModeAttr().Get() or Usd.ModelAPI(prim).IsKind("component")
+            if applied and mode != UsdGeom.Tokens.default_:
+                self.lost.add(str(prim.GetPath()), f"model:drawMode {mode}", "it is drawn in full")
 
     def _name_colours(self, prim: Usd.Prim) -> None:
         """Name what colours each instance on its own."""
@@ -161,13 +182,18 @@ class Walker:
             if not roots[number]:
                 self.lost.add(path, f"prototype {paths[number]} that does not exist", "its instances are left out")
                 continue
+            if roots[number].IsAbstract():
+                self.lost.add(path, f"prototype {paths[number]} that is a class", "its instances are left out, as USD draws no classes; make it an over")
+                continue
             shown = found.visible and (not mask or bool(mask[i]))
             name = (*found.key, int(ids[i]), int(number))
             for kind, below, where, local, seen in self._placed(roots[number], moment):
                 part = Found((*name, where), kind, below, placed[i] if local is None else placed[i] @ local, shown and seen, found.still)
                 if kind == "instancer":
                     yield from self._instances(part, moment, depth + 1)
-                elif kind not in ("camera", "dome"):
+                elif kind == "dome":
+                    self.lost.add(where, "dome light in a prototype", "it does not shine; put it outside of PointInstancers")
+                elif kind != "camera":
                     yield part
 
     def _placed(self, root: Usd.Prim, moment: _Moment) -> list[tuple[str, Usd.Prim, str, np.ndarray | None, bool]]:
