@@ -7,7 +7,7 @@ import pytest
 
 pytest.importorskip("pxr", reason="SKIPPED LOUDLY: usd-core is not installed (pip install usd-core)")
 
-from exporters.usd.subdivide import Polygons, catmull_clark, smooth_normals
+from exporters.usd.subdivide import Polygons, catmull_clark, face_varying, smooth_normals
 
 CUBE = np.array([(x, y, z) for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], float)
 FACES = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
@@ -84,3 +84,63 @@ def test_normals_are_smooth_and_stop_at_creases():
     points = soft.points[soft.corners]
     cosine = (smooth_normals(soft) * points).sum(axis=1) / np.linalg.norm(points, axis=1)
     assert cosine.min() > 0.97
+
+
+def islands(faces):
+    """Texture coordinates of a cube's corners: each side for itself."""
+    return [(2 * f + x, y) for f in range(len(faces)) for x, y in ((0, 0), (0, 1), (1, 1), (1, 0))]
+
+
+def net(faces, lid=3):
+    """Unfolded around the side of the points 0 to 3 and bent a little; the lid hangs on a side, or lies farther out by itself."""
+    out = []
+    for face in faces:
+        low = [v for v in face if v < 4]
+        for v in face:
+            y, z = (1 if v & 2 else -1), (1 if v & 1 else -1)
+            if not low:
+                y = lid if v & 2 else lid + 2
+            elif v & 4:
+                y, z = (3 * y, z) if (low[0] ^ low[1]) == 1 else (y, 3 * z)
+            out.append((y + 0.1 * z * z, z + 0.05 * y * y))
+    return out
+
+
+def net_and_lid(faces):
+    """Three regions meet at its corners."""
+    return net(faces, lid=4)
+
+
+RULES = {"cornersOnly": "PRESERVE_CORNERS", "cornersPlus1": "PRESERVE_CORNERS_AND_JUNCTIONS", "boundaries": "PRESERVE_BOUNDARIES"}
+
+
+@pytest.mark.parametrize("rule", RULES)
+@pytest.mark.parametrize("layout", [islands, net, net_and_lid])
+@pytest.mark.parametrize("case", ["smooth", "one edge", "open box"])
+def test_face_varying_values_agree_with_opensubdiv(blender, case, layout, rule):
+    """Texture coordinates at every corner of two levels."""
+    import blender_scene as b
+
+    creases, _, faces = CASES[case]
+    coordinates = np.array(layout(faces))
+    mesh = ours({}, {}, faces, 0)
+    if creases:
+        mesh.edges, mesh.sharpness = np.array(list(creases)), np.full(len(creases), 10.0)
+    mesh.seamed["st"] = face_varying(mesh, coordinates, rule)
+    for _ in range(2):
+        mesh = catmull_clark(mesh)
+    got = np.concatenate([mesh.points[mesh.corners], mesh.seamed["st"].points[mesh.seamed["st"].corners]], axis=1)
+    ob = b.mesh("Cage", CUBE.tolist(), faces)
+    layer = ob.data.uv_layers.new(name="st")
+    layer.data.foreach_set("uv", coordinates.astype(np.float32).reshape(-1))
+    sharp = ob.data.attributes.new("crease_edge", "FLOAT", "EDGE")
+    for edge in ob.data.edges:
+        sharp.data[edge.index].value = creases.get(tuple(sorted(edge.vertices)), 0.0)
+    modifier = ob.modifiers.new("s", "SUBSURF")
+    modifier.levels, modifier.use_limit_surface, modifier.boundary_smooth, modifier.uv_smooth = 2, False, "PRESERVE_CORNERS", RULES[rule]
+    data = ob.evaluated_get(blender.context.evaluated_depsgraph_get()).data
+    want = np.array([(*data.vertices[loop.vertex_index].co, *data.uv_layers[0].data[loop.index].uv) for loop in data.loops])
+    assert len(got) == len(want)
+    distance = np.linalg.norm(got[:, None] - want[None], axis=2)
+    assert distance.min(axis=1).max() < 1e-5
+    assert distance.min(axis=0).max() < 1e-5

@@ -53,6 +53,21 @@ def test_values_at_points_are_subdivided_as_the_points_are(usd_convert, material
     assert off["varying"] > 0.1
 
 
+@pytest.mark.parametrize(("rule", "straight"), [(None, False), ("cornersOnly", False), ("boundaries", True), ("all", True)])
+def test_values_at_corners_are_subdivided_as_the_mesh_says(usd_convert, material, rule, straight):
+    """By default they are smoothed with the points, but for seams; here, where every point has one value, as the points are."""
+    made = u.stage(frames=None)
+    u.camera(made)
+    prim = grid(made)
+    if rule:
+        prim.CreateFaceVaryingLinearInterpolationAttr(rule)
+    u.uv(prim, GRID, "faceVarying", indices=prim.GetFaceVertexIndicesAttr().Get())
+    material(made, prim)
+    _, arrays = primitive(usd_convert(made), "Grid")
+    off = np.abs(arrays["TEXCOORD_0"] * (1, -1) + (0, 1) - arrays["POSITION"][:, :2]).max()
+    assert off > 0.1 if straight else off < 1e-6
+
+
 def test_colours_at_points_are_subdivided_as_the_points_are(usd_convert):
     made = u.stage(frames=None)
     u.camera(made)

@@ -82,9 +82,9 @@ def made_poses(monkeypatch):
     """The number of times a mesh has been made; a list of one number."""
     count, real = [0], mesh._polygons
 
-    def counting(*arguments):
+    def counting(*arguments, **named):
         count[0] += 1
-        return real(*arguments)
+        return real(*arguments, **named)
 
     monkeypatch.setattr(mesh, "_polygons", counting)
     return count

@@ -9,7 +9,7 @@ import numpy as np
 from pxr import Usd, UsdGeom, UsdShade
 
 from ..common.report import Lost
-from .subdivide import INFINITE, Polygons, catmull_clark, smooth_normals
+from .subdivide import INFINITE, Polygons, catmull_clark, face_varying, smooth_normals
 from .triangulate import triangulate
 
 _MAX_FACES = 4_000_000
@@ -42,7 +42,7 @@ def read_mesh(prim: Usd.Prim, time: Usd.TimeCode, levels: int, lost: Lost) -> li
 
 def add_pose(primitives: list[Primitive], prim: Usd.Prim, time: Usd.TimeCode, levels: int, lost: Lost) -> bool:
     """Record the mesh's shape at another time; False if its topology is another."""
-    polygons, has_normals = _polygons(UsdGeom.Mesh(prim), time, levels, lost)
+    polygons, has_normals = _polygons(UsdGeom.Mesh(prim), time, levels, lost, posed=True)
     if polygons is None or any(len(p.corner_of) and p.corner_of.max() >= len(polygons.corners) for p in primitives):
         return False
     for p in primitives:
@@ -92,8 +92,8 @@ def _topology(mesh: UsdGeom.Mesh) -> tuple[Usd.Attribute, ...]:
     return (mesh.GetFaceVertexCountsAttr(), mesh.GetFaceVertexIndicesAttr(), mesh.GetHoleIndicesAttr())
 
 
-def _polygons(mesh: UsdGeom.Mesh, time: Usd.TimeCode, levels: int, lost: Lost) -> tuple[Polygons | None, bool]:
-    """The mesh with all primvars at corners, subdivided; and whether it has normals."""
+def _polygons(mesh: UsdGeom.Mesh, time: Usd.TimeCode, levels: int, lost: Lost, posed: bool = False) -> tuple[Polygons | None, bool]:
+    """The mesh with all primvars at corners, of a pose with its normals only, subdivided; and whether it has normals."""
     path = str(mesh.GetPath())
     points = _array(mesh.GetPointsAttr(), time, float, 3)
     counts = _array(mesh.GetFaceVertexCountsAttr(), time, int)
@@ -113,20 +113,25 @@ def _polygons(mesh: UsdGeom.Mesh, time: Usd.TimeCode, levels: int, lost: Lost) -
     out = Polygons(points, counts, corners, np.arange(len(counts)))
     _creases(mesh, time, out)
     subdivide = levels if scheme == UsdGeom.Tokens.catmullClark else 0
-    _primvars(mesh, time, out, subdivide > 0, lost)
+    seamed = _primvars(mesh, time, out, subdivide > 0, lost)
     if subdivide:
         # Authored normals mean nothing on a subdivision surface (UsdGeomMesh: "normals are ignored").
         out.corner.pop("NORMAL", None)
+    if posed:
+        out.vertex, out.corner, seamed = {}, {k: v for k, v in out.corner.items() if k == "NORMAL"}, []
     if out.counts.min() < 3:
         # A face of two corners or none is nothing to see, and no rule of subdivision speaks of it.
         out = _keep(out, out.counts >= 3)
+    linear = str(mesh.GetFaceVaryingLinearInterpolationAttr().Get(time))
+    if subdivide and linear != UsdGeom.Tokens.all:
+        out.seamed = {key: face_varying(out, out.corner.pop(key), linear) for key in seamed}
     rule = mesh.GetInterpolateBoundaryAttr().Get(time)
     for level in range(subdivide):
         if len(out.corners) * 4 > _MAX_FACES:
             lost.add(path, f"subdivision beyond level {level}", "it would make more than four million faces; simplify the cage")
             break
         out = catmull_clark(out, corners_sharp=rule != UsdGeom.Tokens.edgeOnly)
-    out.corner |= {k: v[out.corners] for k, v in out.vertex.items()}
+    out.corner |= {k: v[out.corners] for k, v in out.vertex.items()} | {k: v.points[v.corners] for k, v in out.seamed.items()}
     holes = _array(mesh.GetHoleIndicesAttr(), time, int)
     good = ~np.isin(out.parents, holes)
     if not good.all():
@@ -166,9 +171,12 @@ def _creases(mesh: UsdGeom.Mesh, time: Usd.TimeCode, out: Polygons) -> None:
     out.point_sharpness[corners[:n][valid]] = np.minimum(weights[:n][valid], INFINITE)
 
 
-def _primvars(mesh: UsdGeom.Mesh, time: Usd.TimeCode, out: Polygons, smooth: bool, lost: Lost) -> None:
-    """Texture coordinates, colour and normals as values at corners; those of points at points where they are to be smoothed."""
-    path = str(mesh.GetPath())
+def _primvars(mesh: UsdGeom.Mesh, time: Usd.TimeCode, out: Polygons, smooth: bool, lost: Lost) -> list[str]:
+    """Texture coordinates, colour and normals as values at corners; those of points at points where they are to be smoothed.
+
+    The result names those that are face-varying.
+    """
+    path, seamed = str(mesh.GetPath()), []
     api = UsdGeom.PrimvarsAPI(mesh.GetPrim())
     for primvar in api.FindPrimvarsWithInheritance():
         name, taken = primvar.GetPrimvarName(), _taken(primvar)
@@ -187,6 +195,7 @@ def _primvars(mesh: UsdGeom.Mesh, time: Usd.TimeCode, out: Polygons, smooth: boo
         values = _spread(values, primvar.GetInterpolation(), out, path, f"primvar {name}", lost)
         if values is not None:
             out.corner[key] = values
+            seamed += [key] if primvar.GetInterpolation() == UsdGeom.Tokens.faceVarying else []
     # `primvars:normals` wins over the attribute `normals` (UsdGeomPointBased).
     normals = api.GetPrimvar("normals")
     values = None
@@ -200,6 +209,7 @@ def _primvars(mesh: UsdGeom.Mesh, time: Usd.TimeCode, out: Polygons, smooth: boo
     if values is not None:
         length = np.linalg.norm(values, axis=1, keepdims=True)
         out.corner["NORMAL"] = np.where(length > 1e-12, values / np.maximum(length, 1e-30), (0, 1, 0))
+    return seamed
 
 
 def inherited(prim: Usd.Prim, time: Usd.TimeCode) -> tuple:

@@ -3,7 +3,8 @@
 The rules are those of DeRose, Kass, Truong, "Subdivision Surfaces in Character Animation" (1998), with OpenSubdiv's
 boundary rule `edgeAndCorner` (USD's default) or `edgeOnly`, its blending of fractional sharpness, and uniform creasing
 (sharpness falls by one a level; 10 and more stays sharp for ever). Values at points follow the rules of the points;
-those at corners (face-varying and varying) are interpolated linearly within each face.
+those at corners (varying) are interpolated linearly within each face. Face-varying values are meshes of their own, cut
+open where neighbouring faces disagree, which UsdGeomMesh.faceVaryingLinearInterpolation then treats as boundaries.
 """
 
 from __future__ import annotations
@@ -31,6 +32,42 @@ class Polygons:
     # Values at points (n, k) and at corners (len(corners), k), by name.
     vertex: dict[str, np.ndarray] = field(default_factory=dict)
     corner: dict[str, np.ndarray] = field(default_factory=dict)
+    # Face-varying values: meshes of the same faces whose points are the values.
+    seamed: dict[str, Polygons] = field(default_factory=dict)
+
+
+def face_varying(mesh: Polygons, values: np.ndarray, rule: str) -> Polygons:
+    """Values at corners as a mesh to subdivide beside theirs.
+
+    What stays where it is: nothing but corners for `cornersOnly` (and `none`), also where three regions meet for
+    `cornersPlus1` (and `cornersPlus2`), all along seams for `boundaries`.
+    """
+    rows = np.concatenate([mesh.corners[:, None].astype(float), np.round(values, 7)], axis=1)
+    _, first, joined = np.unique(rows, axis=0, return_index=True, return_inverse=True)
+    joined, at = joined.reshape(-1), mesh.corners[first]
+    out = Polygons(values[first], mesh.counts, joined, mesh.parents)
+    following = _following(mesh.counts)
+    pairs = np.stack([joined, joined[following]], axis=1)
+    if len(mesh.edges):
+        theirs = np.stack([mesh.corners, mesh.corners[following]], axis=1)
+        edges, number = np.unique(np.sort(theirs, axis=1), axis=0, return_inverse=True)
+        out.edges, out.sharpness = pairs, _edge_sharpness(mesh, edges, len(mesh.points))[number.reshape(-1)]
+    own = mesh.point_sharpness[at].copy() if mesh.point_sharpness is not None else np.zeros(len(at))
+    if rule not in ("none", "cornersOnly"):
+        own[np.bincount(at)[at] > 2] = INFINITE
+    if rule == "boundaries":
+        edges, uses = np.unique(np.sort(pairs, axis=1), axis=0, return_counts=True)
+        own[edges[uses != 2].reshape(-1)] = INFINITE
+    out.point_sharpness = own
+    return out
+
+
+def _following(counts: np.ndarray) -> np.ndarray:
+    """For each corner the next one of its face."""
+    starts = np.concatenate([[0], np.cumsum(counts)[:-1]])
+    following = np.arange(counts.sum()) + 1
+    following[starts + counts - 1] = starts
+    return following
 
 
 def catmull_clark(mesh: Polygons, corners_sharp: bool = True) -> Polygons:
@@ -39,8 +76,7 @@ def catmull_clark(mesh: Polygons, corners_sharp: bool = True) -> Polygons:
     faces, n = len(counts), len(points)
     starts = np.concatenate([[0], np.cumsum(counts)[:-1]])
     face_of = np.repeat(np.arange(faces), counts)
-    following = np.arange(len(corners)) + 1
-    following[starts + counts - 1] = starts
+    following = _following(counts)
     pairs = np.sort(np.stack([corners, corners[following]], axis=1), axis=1)
     edges, edge_of = np.unique(pairs, axis=0, return_inverse=True)
     edge_of = edge_of.reshape(-1)
@@ -97,6 +133,7 @@ def catmull_clark(mesh: Polygons, corners_sharp: bool = True) -> Polygons:
         corners=quads.reshape(-1),
         parents=mesh.parents[face_of],
         vertex={k: refine(v) for k, v in mesh.vertex.items()},
+        seamed={k: catmull_clark(v) for k, v in mesh.seamed.items()},
     )
     for name, values in mesh.corner.items():
         centres = _mean(values, face_of, faces, counts)[face_of]
@@ -122,8 +159,7 @@ def smooth_normals(mesh: Polygons) -> np.ndarray:
     faces = len(mesh.counts)
     starts = np.concatenate([[0], np.cumsum(mesh.counts)[:-1]])
     face_of = np.repeat(np.arange(faces), mesh.counts)
-    following = np.arange(len(corners)) + 1
-    following[starts + mesh.counts - 1] = starts
+    following = _following(mesh.counts)
     previous = np.arange(len(corners)) - 1
     previous[starts] = starts + mesh.counts - 1
     here, ahead, behind = points[corners], points[corners[following]], points[corners[previous]]
