@@ -131,27 +131,37 @@ class Document:
         self._cache[key] = index
         return index
 
-    def save(self, path: Path) -> list[Path]:
-        """Write `.glb` or `.gltf` + `.bin`, each whole or not at all; the files written."""
+    def buffer(self) -> bytes:
+        """The binary buffer as it stands in a file."""
         self._pad()
+        return bytes(self.binary)
+
+    def text(self, binary: str = "") -> bytes:
+        """The JSON, with the name of the file that holds the buffer; none inside a GLB."""
         root = {k: v for k, v in self.root.items() if v not in ([], {})}
-        binary = path.with_suffix(".bin")
         if self.binary:
-            root["buffers"] = [{"byteLength": len(self.binary)}]
-            if path.suffix != ".glb":
-                root["buffers"][0]["uri"] = quote(binary.name)
-        text = json.dumps(root, separators=(",", ":"), ensure_ascii=False, allow_nan=False).encode()
-        if path.suffix != ".glb":
-            if self.binary:
-                write_whole(binary, bytes(self.binary))
-            write_whole(path, text)
-            return [path, binary] if self.binary else [path]
+            root["buffers"] = [{"byteLength": len(self.buffer())} | ({"uri": quote(binary)} if binary else {})]
+        return json.dumps(root, separators=(",", ":"), ensure_ascii=False, allow_nan=False).encode()
+
+    def packed(self) -> bytes:
+        """All of it as a GLB."""
+        text = self.text()
         text += b" " * (-len(text) % 4)
         chunks = struct.pack("<II", len(text), _JSON_CHUNK) + text
         if self.binary:
-            chunks += struct.pack("<II", len(self.binary), _BIN_CHUNK) + bytes(self.binary)
-        write_whole(path, struct.pack("<III", _GLB_MAGIC, 2, 12 + len(chunks)) + chunks)
-        return [path]
+            chunks += struct.pack("<II", len(self.binary), _BIN_CHUNK) + self.buffer()
+        return struct.pack("<III", _GLB_MAGIC, 2, 12 + len(chunks)) + chunks
+
+    def save(self, path: Path) -> list[Path]:
+        """Write `.glb` or `.gltf` + `.bin`, each whole or not at all; the files written."""
+        if path.suffix == ".glb":
+            write_whole(path, self.packed())
+            return [path]
+        binary = path.with_suffix(".bin")
+        if self.binary:
+            write_whole(binary, self.buffer())
+        write_whole(path, self.text(binary.name))
+        return [path, binary] if self.binary else [path]
 
 
 def _number(x: Any) -> int | float:

@@ -6,14 +6,10 @@ The ones to replace are those that the glTF file of the export before refers to.
 from __future__ import annotations
 
 import itertools
-import json
 import os
 import shutil
 import tempfile
 from pathlib import Path
-from urllib.parse import quote
-
-import pygltflib
 
 from ..common.document import Document
 from ..common.files import files_of_earlier, put_in_place, remove_if_empty, unwritable
@@ -54,18 +50,11 @@ class Output:
 
     def finish(self, document: Document) -> None:
         """Write the document and move all files to their places, the target last."""
-        root = {k: v for k, v in document.root.items() if v not in ([], {})}
-        as_text = self.target.suffix == ".gltf"
-        if document.binary:
-            root["buffers"] = [{"byteLength": len(document.binary)}]
-            if as_text:
-                root["buffers"][0]["uri"] = quote(self.add(self.target.stem, ".bin", bytes(document.binary)))
-        gltf = pygltflib.GLTF2.from_json(json.dumps(root))
-        if as_text:
-            self._write(self.target, gltf.gltf_to_json(separators=(",", ":"), indent=None).encode())
+        if self.target.suffix == ".glb":
+            self._write(self.target, document.packed())
         else:
-            gltf.set_binary_blob(bytes(document.binary))
-            self._write(self.target, b"".join(gltf.save_to_bytes()))
+            binary = self.add(self.target.stem, ".bin", document.buffer()) if document.binary else ""
+            self._write(self.target, document.text(binary))
         put_in_place([(made, path) for path, made in self._ready.items()], self._own, self._beside)
 
     def _write(self, path: Path, data: bytes) -> None:

@@ -21,7 +21,7 @@ def _import():
     try:
         job = importlib.import_module("exporters.usd.job")
     except ImportError as error:
-        print(f"error: {error}; install the packages usd-core, pygltflib, numpy and pillow", file=sys.stderr)
+        print(f"error: {error}; install the packages usd-core, numpy and pillow", file=sys.stderr)
         raise SystemExit(1) from None
     return job, importlib.import_module("exporters.common.report")
 

@@ -3,7 +3,7 @@
     python docs/pictures/pipeline/make_pictures.py shot
     python docs/pictures/pipeline/make_pictures.py beside NAME FILE.blend|STAGE.usda FRAME [camera-light]
 
-Needs bpy, usd-core, pygltflib, numpy, OpenEXR, pillow and a built buzz-convert (BUZZ_CONVERT or target/release).
+Needs bpy, usd-core, numpy, OpenEXR, pillow and a built buzz-convert (BUZZ_CONVERT or target/release).
 """
 
 from __future__ import annotations
