@@ -273,6 +273,12 @@ def _subsets(mesh: UsdGeom.Mesh, polygons: Polygons, time: Usd.TimeCode, lost: L
     rest = np.ones(len(polygons.counts), dtype=bool)
     found = []
     for subset in UsdShade.MaterialBindingAPI(mesh.GetPrim()).GetMaterialBindSubsets():
+        kind = subset.GetElementTypeAttr().Get()
+        if kind != UsdGeom.Tokens.face:
+            lost.add(str(subset.GetPath()), f"GeomSubset of elementType {kind}", "its material is not seen; give it faces")
+            continue
+        if subset.GetIndicesAttr().ValueMightBeTimeVarying():
+            lost.add(str(subset.GetPath()), "animated indices", "those of the first frame are used; cut the mesh up")
         chosen = np.isin(polygons.parents, _array(subset.GetIndicesAttr(), time, int)) & rest
         if chosen.any():
             found.append((subset.GetPrim(), chosen))

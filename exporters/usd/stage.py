@@ -26,7 +26,8 @@ class Said:
         for said in self._delegate.TakeUncoalescedDiagnostics():
             # What cannot be composed is named when the stage is opened, and said again at every change.
             if "WARNING" in said.diagnosticCodeString and not said.sourceFunction.endswith("_ReportErrors"):
-                text = " ".join(said.commentary.split())
+                # Layers in memory are called by an address, another one at every run.
+                text = re.sub("anon:0x[0-9a-f]+:", "", " ".join(said.commentary.split()))
                 where = re.search(r"<(/[^<>.]+)|^(/[^ .]+)", text)
                 object_ = (where[1] or where[2]) if where else name
                 lost.add(object_, f"{feature}: {text.removeprefix(f'{object_} -- ')[:200]}", action)
