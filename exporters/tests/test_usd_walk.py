@@ -209,3 +209,25 @@ def test_a_dome_in_a_prototype_is_named(usd_convert):
     gltf = usd_convert(made)
     assert gltf.lost_features("/World/Many/Proto/Sky") == ["dome light in a prototype"]
     assert len(named(gltf, "Card")) == 2
+
+
+def test_what_many_instances_lack_is_named_once(usd_convert, tmp_path):
+    asset = Usd.Stage.CreateNew(str(tmp_path / "fur.usda"))
+    asset.SetDefaultPrim(UsdGeom.Xform.Define(asset, "/Fur").GetPrim())
+    UsdGeom.BasisCurves.Define(asset, "/Fur/Hair")
+    asset.Save()
+    made = u.stage()
+    u.camera(made)
+    for i in range(5):
+        prim = made.DefinePrim(f"/World/I{i}", "Xform")
+        prim.GetReferences().AddReference("fur.usda")
+        prim.SetInstanceable(True)
+    assert [i["object"] for i in usd_convert(made).lost.items if i["feature"] == "BasisCurves"] == ["/World/I0/Hair"]
+
+
+@pytest.mark.parametrize(("space", "lost"), [("lin_ap1_scene", ["colour space lin_ap1_scene"]), ("lin_rec709_scene", [])])
+def test_other_primaries_are_named(usd_convert, space, lost):
+    made = u.stage()
+    u.camera(made)
+    Usd.ColorSpaceAPI.Apply(made.GetPrimAtPath("/World")).CreateColorSpaceNameAttr(space)
+    assert usd_convert(made).lost_features("/World") == lost

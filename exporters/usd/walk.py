@@ -24,6 +24,8 @@ _NAMED = {
     "ParticleField3DGaussianSplat": "convert it to a mesh",
     "GenerativeProcedural": "write out what it makes",
 }
+# Names of what colours are taken to be, and of what has none.
+_REC709 = ("lin_rec709", "lin_rec709_scene", "raw", "data", "identity", "unknown")
 _DEEPEST = 8
 _PURPOSES = (UsdGeom.Tokens.default_, UsdGeom.Tokens.render)
 
@@ -58,6 +60,7 @@ class Walker:
         self.stage, self.lost = stage, lost
         self._below: dict[Usd.Prim, list[tuple[str, Usd.Prim]]] = {}
         self._changing: dict[Usd.Prim, bool] = {}
+        self._instanced: set[Usd.Prim] = set()
         self.prims = [(kind, prim, self._still(kind, prim)) for kind, prim in self._list(stage.GetPseudoRoot())]
 
     def _list(self, root: Usd.Prim) -> Iterator[tuple[str, Usd.Prim]]:
@@ -68,7 +71,7 @@ class Walker:
                 walk.PruneChildren()
             if not prim.IsDefined() and root.IsPseudoRoot():
                 continue
-            self._name_model(prim)
+            self._name_state(prim)
             if kind := self._kind(prim, root):
                 yield kind, prim
 
@@ -89,7 +92,7 @@ class Walker:
             if purpose != UsdGeom.Tokens.render and prim.GetAttribute("renderVisibility").Get() == UsdGeom.Tokens.invisible:
                 self.lost.add(str(prim.GetPath()), "renderVisibility without purpose render", "USD heeds it for that purpose only: it is drawn; set visibility")
             if name in _NAMED:
-                if not root.IsPseudoRoot() or not self._never_seen(prim):
+                if (not root.IsPseudoRoot() or not self._never_seen(prim)) and self._first_of_its_kind(prim):
                     self.lost.add(str(prim.GetPath()), str(name), f"it is left out; {_NAMED[name]}")
                 return None
             if is_light(prim):
@@ -100,12 +103,23 @@ class Walker:
             self.lost.add(str(prim.GetPath()), f"{name}, a type that USD does not know here", "it is left out; convert it to a mesh")
         return shape
 
+    def _first_of_its_kind(self, prim: Usd.Prim) -> bool:
+        """Whether no other instance of a prim has been named: a thousand lines would say the same."""
+        source = prim.GetPrimInPrototype() if prim.IsInstanceProxy() else prim
+        new = source not in self._instanced
+        self._instanced.add(source)
+        return new
+
     def _never_seen(self, prim: Usd.Prim) -> bool:
         """Whether a prim is invisible at all times: nothing of it can be lost."""
         return not self._changes(prim) and not _visible(UsdGeom.Imageable(prim), Usd.TimeCode.EarliestTime())
 
-    def _name_model(self, prim: Usd.Prim) -> None:
-        """Name a model that viewers draw as something simpler."""
+    def _name_state(self, prim: Usd.Prim) -> None:
+        """Name what a prim says of all below it: other primaries, and that viewers draw a model as something simpler."""
+        if prim.HasAPI(Usd.ColorSpaceAPI):
+            space = Usd.ColorSpaceAPI(prim).GetColorSpaceNameAttr().Get()
+            if space and str(space) not in _REC709:
+                self.lost.add(str(prim.GetPath()), f"colour space {space}", "its colours are taken as linear Rec.709; convert them")
         if prim.IsModel() and prim.HasAPI(UsdGeom.ModelAPI):
             api = UsdGeom.ModelAPI(prim)
             mode = api.ComputeModelDrawMode()
