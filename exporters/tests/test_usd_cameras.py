@@ -176,6 +176,18 @@ def test_products_override_settings(usd_convert):
     assert (gltf.buzz["resolution"], gltf.buzz["pixel_aspect"]) == ([64, 36], 2)
 
 
+def test_what_render_settings_ask_for_in_vain_is_named(usd_convert):
+    made = u.stage()
+    u.camera(made)
+    settings = UsdRender.Settings.Define(made, "/Render/Settings")
+    assert not usd_convert(made).lost_features("/Render/Settings")
+    settings.CreateIncludedPurposesAttr(["default", "proxy"])
+    settings.CreateMaterialBindingPurposesAttr(["preview", ""])
+    products = [UsdRender.Product.Define(made, f"/Render/{name}").GetPath() for name in ("Beauty", "Wide")]
+    settings.CreateProductsRel().SetTargets(products)
+    assert usd_convert(made).lost_features("/Render/Settings") == ["includedPurposes", "materialBindingPurposes", "several products"]
+
+
 @pytest.mark.parametrize(("name", "value"), [("resolution", Gf.Vec2i(0, 100)), ("pixelAspectRatio", 0.0)])
 def test_settings_without_pixels_are_one_clear_error(usd_convert, name, value):
     from exporters.common.report import InputError

@@ -21,7 +21,7 @@ ENCODED, DECODED = 188, 55
 def card(usd_convert, tmp_path):
     """Convert a card: card(input, file, output, **texture inputs) gives the document, its material."""
 
-    def run(*textures, transforms=(), circle=False, **surface):
+    def run(*textures, transforms=(), circle=False, reader="UsdPrimvarReader_float2", **surface):
         made = u.stage()
         u.camera(made)
         prim = u.quad(made, "/World/Card")
@@ -30,6 +30,7 @@ def card(usd_convert, tmp_path):
         for name, file, output, inputs in textures:
             node = u.texture(made, material, name, file, output, **inputs)
             source = UsdShade.Shader(made.GetPrimAtPath(f"/World/M/{name}Reader"))
+            source.CreateIdAttr(reader)
             for i, values in enumerate(transforms):
                 turn = UsdShade.Shader.Define(made, f"/World/M/{name}Turn{i}")
                 turn.CreateIdAttr("UsdTransform2d")
@@ -175,9 +176,11 @@ def test_black_borders_are_named(card, tmp_path):
     assert gltf.lost_features("/World/M") == ["wrap mode black"]
 
 
-def test_coordinates_that_go_round_in_a_circle_are_named(card, tmp_path):
-    gltf, _ = card(("diffuseColor", grey(tmp_path / "g.png"), "rgb", {}), transforms=({}, {}), circle=True)
-    assert gltf.lost_features("/World/M") == ["texture coordinates that go round in a circle"]
+@pytest.mark.parametrize("node", ["circle of nodes", "ND_place2d_vector2 node"])
+def test_coordinates_from_elsewhere_are_named(card, tmp_path, node):
+    turns, kind = ({}, {}), {} if node.startswith("circle") else {"reader": node.removesuffix(" node")}
+    gltf, _ = card(("diffuseColor", grey(tmp_path / "g.png"), "rgb", {}), transforms=turns, circle=not kind, **kind)
+    assert gltf.lost_features("/World/M") == [f"texture coordinates from a {node}"]
 
 
 @pytest.mark.parametrize("tiles", [(1001,), (1001, 1002), ()])

@@ -112,6 +112,8 @@ class _Conversion:
         """Resolution, pixel aspect, policy and camera from RenderSettings, overridden by their first product."""
         settings = UsdRender.Settings.GetStageRenderSettings(self.stage)
         prims = [settings.GetPrim()] if settings else [p for p in self.stage.Traverse() if p.IsA(UsdRender.Settings)][:1]
+        for prim in prims:
+            self._name_settings(UsdRender.Settings(prim))
         prims += [self.stage.GetPrimAtPath(t) for p in prims for t in UsdRender.Settings(p).GetProductsRel().GetTargets()][:1]
         prims = prims or [p for p in self.stage.Traverse() if p.IsA(UsdRender.Product)][:1]
         self.resolution, self.pixel_aspect, self.policy, self.camera = self.options.resolution, 1.0, "expandAperture", self.options.camera
@@ -134,6 +136,16 @@ class _Conversion:
                 self.lost.add(str(prim.GetPath()), "dataWindowNDC", "the whole picture is rendered; pass --crop to buzz-convert")
         if self.policy == "adjustPixelAspectRatio":
             self.lost.add("RenderSettings", "adjustPixelAspectRatio", "the pixel aspect of the first camera frame is used for the whole shot")
+
+    def _name_settings(self, settings: UsdRender.Settings) -> None:
+        """Name what RenderSettings ask for and do not get."""
+        path = str(settings.GetPath())
+        for attribute in (settings.GetIncludedPurposesAttr(), settings.GetMaterialBindingPurposesAttr()):
+            usual = attribute.GetPrim().GetPrimDefinition().GetAttributeFallbackValue(attribute.GetName())
+            if set(attribute.Get()) != set(usual):
+                self.lost.add(path, attribute.GetName(), f"what is seen is always {', '.join(x or 'allPurpose' for x in usual)}; change purposes and bindings")
+        if len(settings.GetProductsRel().GetTargets()) > 1:
+            self.lost.add(path, "several products", "the first one's camera and resolution are used; convert once for each, with --camera and --resolution")
 
     def _range(self) -> tuple[int, int]:
         times = [self.stage.GetStartTimeCode(), self.stage.GetEndTimeCode()]

@@ -119,11 +119,7 @@ class Readers:
             attributes = UsdShade.Utils.GetValueProducingAttributes(current)
             source = UsdShade.Shader(attributes[0].GetPrim()) if attributes else None
             kind = source.GetIdAttr().Get() if source else None
-            if kind == "UsdTransform2d" and source.GetPath() in met:
-                self.lost.add(
-                    self.path, "texture coordinates that go round in a circle", "they are used as they are; connect them to a UsdPrimvarReader_float2"
-                )
-            elif kind == "UsdTransform2d":
+            if kind == "UsdTransform2d" and source.GetPath() not in met:
                 met.add(source.GetPath())
                 # The nodes are met from the texture backwards: the last one met is applied first.
                 whole, found = whole @ self._transform(source), True
@@ -131,6 +127,9 @@ class Readers:
                 continue
             if kind and kind.startswith("UsdPrimvarReader"):
                 name = str(self.value(source, "varname", "st"))
+            elif kind:
+                what = "circle of nodes" if source.GetPath() in met else f"{kind} node"
+                self.lost.add(self.path, f"texture coordinates from a {what}", "the primvar st is used; connect them to a UsdPrimvarReader_float2")
             break
         return name, self._turned_over(whole) if found else None
 
