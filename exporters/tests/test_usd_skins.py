@@ -7,7 +7,7 @@ import pytest
 
 pytest.importorskip("pxr", reason="SKIPPED LOUDLY: usd-core is not installed (pip install usd-core)")
 import usd_scene as u
-from pxr import Gf, Usd, UsdGeom, UsdSkel
+from pxr import Gf, Sdf, Usd, UsdGeom, UsdSkel
 
 
 def skeleton(made, path):
@@ -96,6 +96,20 @@ def test_instances_in_a_model(usd_convert, tmp_path):
     gltf = usd_convert(made)
     assert moves(gltf) == [True, False, False]
     assert len({n["mesh"] for n in gltf.root["nodes"] if n.get("name") == "Hat"}) == 1
+
+
+@pytest.mark.parametrize("specifier", [Sdf.SpecifierDef, Sdf.SpecifierOver])
+def test_crowds(usd_convert, specifier):
+    """Models that a PointInstancer scatters, below a prim that is drawn itself or not."""
+    made = u.stage(frames=(1, 3))
+    u.camera(made)
+    model(made, "/Actors/One")
+    made.GetPrimAtPath("/Actors").SetSpecifier(specifier)
+    crowd = UsdGeom.PointInstancer.Define(made, "/World/Crowd")
+    crowd.CreatePrototypesRel().SetTargets(["/Actors/One"])
+    crowd.CreateProtoIndicesAttr([0, 0])
+    crowd.CreatePositionsAttr([(0, 0, 0), (5, 0, 0)])
+    assert moves(usd_convert(made)) == [True] * (2 if specifier == Sdf.SpecifierOver else 3)
 
 
 @pytest.mark.parametrize(
