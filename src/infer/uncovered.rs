@@ -132,7 +132,7 @@ mod tests {
         assert_eq!(before_the_eye(&[corner(1.0), corner(2.0), corner(3.0)], 0.5, true).1, 3);
         let cut = before_the_eye(&[corner(-1.0), corner(2.0), corner(3.0)], 0.5, true);
         assert_eq!(cut.1, 4);
-        assert!(cut.0.iter().all(|c| c.z >= 0.5 - 1e-6));
+        assert!(cut.0[..cut.1].iter().all(|c| c.z >= 0.5 - 1e-6));
         // Without a near plane too.
         let cut = before_the_eye(&[corner(-1.0), corner(2.0), corner(3.0)], 0.0, true);
         assert!(cut.0[..cut.1].iter().all(|c| c.z > 0.0));
