@@ -161,14 +161,14 @@ impl Changed {
     }
 
     /// Finds out on which lights column `x` of `row` agrees with the two pixels between which it lies, which have been asked: on
-    /// none if either shows another surface.
-    pub fn compare(
+    /// none if either shows another surface. Shares are averaged with those of them, and with what was known `above` and below.
+    pub fn compare<'o>(
         &mut self,
         row: &mut Row<'_>,
         x: usize,
-        steps: Steps,
-        view: &Projector,
+        (steps, view): (Steps, &Projector),
         rays: &impl CastCentres,
+        known: impl Fn(&Tangent<'_>) -> [Option<&'o [u32]>; 2],
     ) {
         self.agreed.fill(0);
         let tangent = Tangent::new(row.sample(x), view);
@@ -178,7 +178,10 @@ impl Changed {
         self.agreed.iter_mut().for_each(|bits| *bits = !*bits);
         self.mean.copy_from_slice(own);
         if rays.has_shares() {
-            let known = [(&*own, OWN_WEIGHT), (left, 1.0), (right, 1.0)];
+            // Of what was known nothing is taken that may have changed.
+            let [above, below] = known(&tangent)
+                .map(|lit| lit.filter(|lit| rays.agree(own, lit)).map_or((&*own, 0.0), |lit| (lit, 1.0)));
+            let known = [(&*own, OWN_WEIGHT), (left, 1.0), (right, 1.0), above, below];
             rays.blend(known.into_iter(), &mut self.mean);
         }
     }

@@ -1,7 +1,7 @@
 //! The rays that are left once samples are re-centred: to see what pixels show, to prove some of what is reused, and to the
 //! lights that may have changed.
 
-use super::around::{Around, Lent, Trust, is_one_surface};
+use super::around::{Around, Lent, Tangent, Trust, is_one_surface};
 use super::between::{self, Changed, Steps};
 use super::buzz_buffer::{BuzzBuffer, Row, UNKNOWN};
 use super::cell::growth;
@@ -261,6 +261,14 @@ impl<'a, R: CastCentres> Pass<'a, R> {
         doubt.fill(if lent == Lent::Cell { 0 } else { u32::MAX });
     }
 
+    /// The shadow bits that landed above and below a pixel, where they lie on its surface.
+    fn known_above_and_below(&self, (x, y): (usize, usize), tangent: &Tangent<'_>) -> [Option<&'a [u32]>; 2] {
+        let landed = |y: usize| self.sources.of(y * self.old.width() + x);
+        let lends = |&i: &usize| tangent.may_lend(&self.old.sample(i));
+        [y.checked_sub(1), Some(y + 1).filter(|&y| y < self.old.height())]
+            .map(|y| y.and_then(landed).filter(lends).map(|i| self.old.lit(i)))
+    }
+
     /// Room for the lights that may have changed, where any may.
     fn changed(&self) -> Changed {
         if self.askers.is_some() { Changed::new(self.old.lit_words()) } else { Changed::default() }
@@ -289,7 +297,8 @@ impl<'a, R: CastCentres> Pass<'a, R> {
         {
             changed.bits.copy_from_slice(ask);
             if self.trust == Trust::Neighbours {
-                changed.compare(row, x, Steps::of(y), self.view, rays);
+                let known = |tangent: &Tangent<'_>| self.known_above_and_below((x, y), tangent);
+                changed.compare(row, x, (Steps::of(y), self.view), rays, known);
             }
             askers.ask(pixel, &row.sample(x), (row.lit(x), &changed.agreed), &mut changed.bits);
             changed.bits.iter_mut().zip(&*ask).for_each(|(bits, asked)| *bits &= !asked);
