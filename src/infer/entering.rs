@@ -6,7 +6,7 @@
 //! they move every sample alike, and what comes into view finds its pixels empty.
 //!
 //! Past the paper, for samples at pixel centres, less is enough: [`at_sides`]. What a near or far plane no longer cuts off comes in
-//! anywhere: see [`uncovered`](super::uncovered).
+//! anywhere: see [`uncovered`](super::uncovered()).
 
 use super::Marks;
 use super::buzz_buffer::BuzzBuffer;
