@@ -124,7 +124,7 @@ class _Export:
         bpy.context.window.scene = temporary
         sampler.geometry.build(temporary, np.array(sampler.taken), self.view_layer.material_override)
         for material in _materials(temporary):
-            as_rendered(material, self.scene.render.engine)
+            as_rendered(material, self.scene.render.engine, self.lost)
         if self.options.bake:
             bake_procedural(temporary, self.options.bake, self.options.progress)
         materials = _materials(temporary)

@@ -12,6 +12,8 @@ import bpy
 import numpy as np
 
 from ..common.report import Lost
+from .constants import constant, put
+from .groups import inline_groups
 from .nodes import CONSTANTS, NORMALS, drop_muted, source, trees, unreadable_inputs, upstream
 from .prepare import is_animated
 
@@ -26,8 +28,6 @@ def prepare_materials(materials: list[bpy.types.Material], lost: Lost) -> None:
         tree = material.node_tree if material.use_nodes else None
         if tree is None:
             continue
-        if any(is_animated(each) for each in (material, *trees(tree))):
-            lost.add(material.name, "animated material", "the values of the first frame are used")
         for each in trees(tree):
             # Blender's exporter goes to a frame of its own.
             each.animation_data_clear()
@@ -47,8 +47,8 @@ def prepare_materials(materials: list[bpy.types.Material], lost: Lost) -> None:
             _name_losses(shader, meshes_of(material), material.name, lost)
 
 
-def as_rendered(material: bpy.types.Material, engine: str) -> None:
-    """Leave of a material what one engine renders, for Blender's exporter asks for none."""
+def as_rendered(material: bpy.types.Material, engine: str, lost: Lost) -> None:
+    """Leave of a material what one engine renders at one time, for Blender's exporter asks for none; without groups, it reads more."""
     if engine == "CYCLES":
         # It shows both sides of everything.
         material.use_backface_culling = False
@@ -58,6 +58,10 @@ def as_rendered(material: bpy.types.Material, engine: str) -> None:
         for node in [node for node in tree.nodes if node.type == "OUTPUT_MATERIAL" and node != shown]:
             tree.nodes.remove(node)
         shown.target, shown.is_active_output = "ALL", True
+    if tree is not None and material.use_nodes:
+        if any(is_animated(each) for each in (material, *trees(tree))):
+            lost.add(material.name, "animated material", "the values of the first frame are used")
+        inline_groups(tree)
 
 
 def default_surface() -> bpy.types.Material:
@@ -135,13 +139,12 @@ def _as_principled(tree: bpy.types.NodeTree, shader: bpy.types.Node | None) -> d
 
 
 def _fold_constants(tree: bpy.types.NodeTree, shader: bpy.types.Node) -> None:
-    """Put values of constant nodes into the inputs themselves, where Blender's exporter always sees them."""
+    """Put what nodes always give into the inputs themselves, where Blender's exporter always sees it."""
     for socket in shader.inputs:
-        out = source(socket)
-        if out is None or {"RGB": "RGBA", "VALUE": "VALUE"}.get(out.node.type) != socket.type:
-            continue
-        socket.default_value = out.default_value
-        tree.links.remove(socket.links[0])
+        value = constant(socket) if socket.is_linked and socket.type in ("VALUE", "RGBA") else None
+        if value is not None:
+            put(socket, value)
+            tree.links.remove(socket.links[0])
 
 
 def _choose_principled(tree, output, shader, name: str, lost: Lost) -> bpy.types.Node | None:

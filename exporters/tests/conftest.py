@@ -38,6 +38,21 @@ def blender():
 
 
 @pytest.fixture
+def surface(blender):
+    """A camera and a square with UV coordinates, colours and the material "Grey"; its Principled node."""
+    import blender_scene as b
+
+    b.camera()
+    b.light("SUN")
+    ob = b.plane("Square", size=2)
+    ob.data.uv_layers.new(name="UVMap")
+    ob.data.color_attributes.new("Tint", "BYTE_COLOR", "CORNER")
+    made, shader = b.material()
+    ob.data.materials.append(made)
+    return shader
+
+
+@pytest.fixture
 def export(blender, tmp_path):
     """Export the open scene and read it back, validated: export(name=..., **options)."""
     from exporters.blender import job

@@ -41,21 +41,6 @@ def texture(blender, shader, coordinates=None, image=None, **settings):
     return made.outputs["Color"]
 
 
-@pytest.fixture
-def surface(blender):
-    """A camera and a square with UV coordinates, colours and the material "Grey"; its Principled node."""
-    import blender_scene as b
-
-    b.camera()
-    b.light("SUN")
-    ob = b.plane("Square", size=2)
-    ob.data.uv_layers.new(name="UVMap")
-    ob.data.color_attributes.new("Tint", "BYTE_COLOR", "CORNER")
-    made, shader = b.material()
-    ob.data.materials.append(made)
-    return shader
-
-
 def colour_of(blender, gltf, info) -> np.ndarray:
     """The mean colour of a glTF texture, as its file holds it."""
     source = gltf.root["textures"][info["index"]]["source"]
@@ -363,12 +348,16 @@ def test_normal_maps_of_other_spaces_are_named(blender, surface, export, space):
 
 
 def test_constant_nodes_are_folded(blender, surface, export):
-    """The exporter does not look for them behind a transmission."""
-    value = node(surface, "Value")
+    """The exporter does not look for them behind a transmission, nor for what is calculated of them."""
+    value, less = node(surface, "Value"), node(surface, "Math", operation="SUBTRACT")
     value.outputs[0].default_value = 0.5
+    less.inputs[0].default_value = 1
     link(value.outputs[0], surface.inputs["Transmission Weight"])
+    link(value.outputs[0], less.inputs[1])
+    link(less.outputs[0], surface.inputs["Base Color"])
     gltf = export(bake=0)
     assert not gltf.lost.items
+    assert material_of(gltf)["pbrMetallicRoughness"]["baseColorFactor"] == [0.5, 0.5, 0.5, 1]
     assert material_of(gltf)["extensions"]["KHR_materials_transmission"]["transmissionFactor"] == 0.5
 
 
