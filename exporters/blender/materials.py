@@ -14,6 +14,7 @@ import numpy as np
 from ..common.report import Lost
 from .constants import constant, put
 from .groups import inline_groups
+from .mixtures import is_clear, multiply_alpha, uncovered
 from .nodes import CONSTANTS, NORMALS, drop_muted, source, trees, unreadable_inputs, upstream
 from .prepare import is_animated
 
@@ -91,20 +92,23 @@ def make_plain(tree: bpy.types.NodeTree) -> None:
     """Rebuild with a Principled BSDF what looks the same with one; called before baking, and again where that is off."""
     drop_muted(tree)
     surface = output_of(tree).inputs["Surface"]
-    old = surface.links[0].from_node if surface.is_linked else None
-    settings = _as_principled(tree, old)
+    shown, covers = uncovered(surface)
+    shader = shown.node if shown is not None else None
+    settings = _as_principled(tree, shader)
     if settings is not None:
-        new = tree.nodes.new("ShaderNodeBsdfPrincipled")
+        shader = tree.nodes.new("ShaderNodeBsdfPrincipled")
         for key, value in settings.items():
             if not isinstance(value, bpy.types.NodeSocket):
-                new.inputs[key].default_value = value
+                shader.inputs[key].default_value = value
             elif value.is_linked:
-                tree.links.new(value.links[0].from_socket, new.inputs[key])
+                tree.links.new(value.links[0].from_socket, shader.inputs[key])
             elif value.type != "VECTOR":
-                new.inputs[key].default_value = value.default_value
-        tree.links.new(new.outputs[0], surface)
-    if surface.links[0].from_node.type == "BSDF_PRINCIPLED":
-        _fold_constants(tree, surface.links[0].from_node)
+                shader.inputs[key].default_value = value.default_value
+    if shader.type == "BSDF_PRINCIPLED":
+        tree.links.new(shader.outputs[0], surface)
+        for cover in covers:
+            multiply_alpha(tree, shader.inputs["Alpha"], cover)
+        _fold_constants(tree, shader)
 
 
 def output_of(tree: bpy.types.NodeTree) -> bpy.types.Node:
@@ -133,7 +137,7 @@ def _as_principled(tree: bpy.types.NodeTree, shader: bpy.types.Node | None) -> d
         return {**copied, "Transmission Weight": 1.0}
     if shader.type == "EMISSION":
         return {**black, "Emission Color": inputs["Color"], "Emission Strength": inputs["Strength"]}
-    if shader.type == "BSDF_TRANSPARENT" and not inputs["Color"].is_linked and min(inputs["Color"].default_value) == 1:
+    if is_clear(shader):
         return {**black, "Alpha": 0.0}
     return None
 
