@@ -14,9 +14,8 @@ _MATH = {
     "ADD": lambda a, b: a + b,
     "SUBTRACT": lambda a, b: a - b,
     "MULTIPLY": lambda a, b: a * b,
-    # Blender's, which give 0 where there is no answer.
+    # Blender gives 0 where there is no answer.
     "DIVIDE": lambda a, b: a / b if b else 0.0,
-    "POWER": lambda a, b: a**b if a > 0 else 0.0,
     "MINIMUM": min,
     "MAXIMUM": max,
 }

@@ -18,6 +18,7 @@ from ..common.extras import LUMENS_PER_WATT, tidy
 from ..common.motion import Animation
 from ..common.report import Lost
 from .cameras import view_matrix
+from .constants import constant
 from .nodes import source
 
 _HALF_PI = math.pi / 2
@@ -140,27 +141,36 @@ def _values(data: bpy.types.Light, scale: np.ndarray) -> dict[str, float]:
 
 
 def _emission(data: bpy.types.Light) -> tuple[np.ndarray, float]:
-    """Colour and strength of a light's Emission node, if it has a plain one; none where its nodes shine not."""
+    """Colour and strength of a light's Emission node, if they are constants; none where its nodes shine not."""
     tree = data.node_tree if data.use_nodes else None
     if tree is None:
         return np.ones(3), 1.0
-    output = tree.get_output_node("ALL") or tree.get_output_node("CYCLES")
-    shown = source(output.inputs["Surface"]) if output is not None else None
+    shown = _shown(tree)
     if shown is None:
         return np.ones(3), 0.0
-    node = shown.node if shown.node.type == "EMISSION" else next((n for n in tree.nodes if n.type == "EMISSION"), None)
+    node = shown if shown.type == "EMISSION" else next((n for n in tree.nodes if n.type == "EMISSION"), None)
     if node is None:
         return np.ones(3), 1.0
-    colour, strength = node.inputs["Color"], node.inputs["Strength"]
-    return (
-        np.ones(3) if colour.is_linked else np.array(colour.default_value[:3]),
-        1.0 if strength.is_linked else strength.default_value,
-    )
+    colour, strength = constant(node.inputs["Color"]), constant(node.inputs["Strength"])
+    return np.ones(3) if colour is None else colour, 1.0 if strength is None else strength
+
+
+def _shown(tree: bpy.types.NodeTree) -> bpy.types.Node | None:
+    """The node that a light shines by."""
+    output = tree.get_output_node("ALL") or tree.get_output_node("CYCLES")
+    out = source(output.inputs["Surface"]) if output is not None else None
+    return out.node if out is not None else None
+
+
+def _is_plain(data: bpy.types.Light) -> bool:
+    """Whether nothing is lost of a light's nodes."""
+    shown = _shown(data.node_tree) if data.use_nodes and data.node_tree else None
+    return shown is None or (shown.type == "EMISSION" and all(constant(shown.inputs[key]) is not None for key in ("Color", "Strength")))
 
 
 def _warn(name: str, data: bpy.types.Light, lost: Lost) -> None:
     """Name what a light has that is not carried."""
-    if data.use_nodes and data.node_tree and any(link.to_node.type == "EMISSION" for link in data.node_tree.links):
+    if not _is_plain(data):
         lost.add(name, "light nodes (texture, IES or falloff)", "only plain colour and strength are carried; use the light's own settings")
     if data.type == "AREA" and data.spread < math.pi - 1e-3:
         lost.add(name, "area light spread", "it shines over the whole half space; use a spot light for a beam")

@@ -9,7 +9,8 @@ from __future__ import annotations
 
 import bpy
 
-from .nodes import drop_muted
+from .groups import inline_groups
+from .nodes import drop_muted, trees
 
 # (viewport, render) pairs of properties that modifiers, curves, metaballs and particle settings have.
 _LEVELS = (("levels", "render_levels"), ("screw_steps", "render_steps"), ("steps", "render_steps"), ("viewport_resolution", "resolution"))
@@ -24,6 +25,9 @@ def prepare(scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer) -> None:
     for owner in (scene.world, *bpy.data.lights):
         if owner is not None and owner.node_tree is not None:
             drop_muted(owner.node_tree)
+            # Copies of nodes would not move with them, and nodes of a library cannot be linked.
+            if not owner.library and not any(map(is_animated, trees(owner.node_tree))):
+                inline_groups(owner.node_tree)
     if scene.render.use_simplify:
         scene.render.simplify_subdivision = scene.render.simplify_subdivision_render
         scene.render.simplify_child_particles = scene.render.simplify_child_particles_render

@@ -20,6 +20,7 @@ from ..common.extras import tidy
 from ..common.motion import Animation
 from ..common.report import Lost
 from ..common.srgb import decoded
+from .constants import constant
 from .nodes import source, upstream
 from .prepare import action_curves, is_animated
 
@@ -42,12 +43,13 @@ def export_world(scene: bpy.types.Scene, folder: Path, stem: str, lost: Lost) ->
     if surface is None:
         return black, ()
     _name_losses(world, tree, lost)
-    if surface.type == "BACKGROUND" and not surface.inputs["Strength"].is_linked:
+    power = constant(surface.inputs["Strength"]) if surface.type == "BACKGROUND" else None
+    if power is not None:
         colour, strength = surface.inputs["Color"], surface.inputs["Strength"]
-        shone = tidy(max(float(strength.default_value), 0.0))
-        if not colour.is_linked:
+        shone, tint = tidy(max(power, 0.0)), constant(colour)
+        if tint is not None:
             _name_animation(world, tree, [colour, strength], lost)
-            return {"color": [tidy(max(c, 0)) for c in colour.default_value[:3]], "strength": shone}, ("color", "strength")
+            return {"color": [tidy(max(c, 0)) for c in tint], "strength": shone}, ("color", "strength")
         image = _environment(source(colour))
         if image is not None:
             uri = _put_image(image[0], folder, stem)
@@ -87,6 +89,8 @@ def _name_animation(world: bpy.types.World, tree: bpy.types.NodeTree, followed: 
     data = tree.animation_data
     paths = {curve.data_path for curve in [*action_curves(tree), *(data.drivers if data else [])]}
     paths -= {socket.path_from_id("default_value") for socket in followed}
+    # What they are constants of is followed with them.
+    nodes -= {out.node for socket in followed for out in upstream(socket)}
     moves = any(path.startswith(f"{node.path_from_id()}.") for path in paths for node in nodes if node.id_data == tree)
     moves = moves or any(is_animated(node.id_data) for node in nodes if node.id_data != tree)
     moves = moves or any(strip for track in (data.nla_tracks if data else []) for strip in track.strips)
@@ -108,7 +112,8 @@ def sample_world(scene: bpy.types.Scene) -> dict[str, Any]:
     surface = _surface(tree) if tree is not None else None
     if surface is None or surface.type != "BACKGROUND":
         return {"color": tuple(world.color) if world is not None else (0, 0, 0), "strength": 1.0}
-    return {"color": tuple(surface.inputs["Color"].default_value[:3]), "strength": surface.inputs["Strength"].default_value}
+    colour, strength = constant(surface.inputs["Color"]), constant(surface.inputs["Strength"])
+    return {"color": (0, 0, 0) if colour is None else tuple(colour), "strength": 1.0 if strength is None else strength}
 
 
 def _environment(out: bpy.types.NodeSocket | None) -> tuple[bpy.types.Image, float] | None:

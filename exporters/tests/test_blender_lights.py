@@ -168,3 +168,97 @@ def test_only_the_emission_that_is_shown_shines(blender, export, muted):
         tree.links.new(second.outputs[0], emission.outputs[0].links[0].to_socket)
     light = export().root["extensions"]["KHR_lights_punctual"]["lights"][0]
     assert light["intensity"] == pytest.approx(683 * 3 if muted == "other" else 0)
+
+
+def emission_of(blender, kind="POINT", **settings):
+    """A light with nodes; its Emission node."""
+    data = make(blender, kind, **settings).data
+    data.use_nodes = True
+    return next(node for node in data.node_tree.nodes if node.type == "EMISSION")
+
+
+def feed(socket, kind, value=None):
+    """Link a new node to an input, and set the node's own value (of its output, or of its first input)."""
+    tree = socket.node.id_data
+    made = tree.nodes.new(f"ShaderNode{kind}")
+    if value is not None:
+        (made.outputs if kind in ("Value", "RGB") else made.inputs)[0].default_value = value
+    tree.links.new(made.outputs[0], socket)
+    return made
+
+
+def radiance(gltf, name="Light"):
+    """Colour times intensity."""
+    _, light = gltf.light(name)
+    return np.array(light["color"]) * light["intensity"]
+
+
+def test_constant_nodes_of_lights_are_what_they_give(blender, export):
+    import blender_scene as b
+
+    plain, _ = emission_of(blender, energy=10.0), b.light("POINT", "Plain", energy=30.0, color=(0.5, 0.25, 1))
+    strength = feed(plain.inputs["Strength"], "Math", 1.0)
+    strength.inputs[1].default_value = 7
+    half = feed(strength.inputs[0], "Math")
+    half.operation, half.inputs[1].default_value = "DIVIDE", -0.5
+    feed(half.inputs[0], "Value", 2.0)
+    feed(plain.inputs["Color"], "RGB", (0.5, 0.25, 1, 1))
+    gltf = export()
+    assert not gltf.lost.items
+    np.testing.assert_allclose(radiance(gltf), radiance(gltf, "Plain"), rtol=1e-6)
+
+
+@pytest.mark.parametrize("kelvin", [1900.0, 3200.0, 6500.0, 12000.0])
+def test_blackbody_is_the_colour_of_a_temperature(blender, export, kelvin):
+    import blender_scene as b
+
+    other = b.light("POINT", "Plain", energy=10.0)
+    if not hasattr(other.data, "use_temperature"):
+        pytest.skip("this Blender has no light temperature")
+    other.data.use_temperature, other.data.temperature = True, kelvin
+    feed(emission_of(blender, energy=10.0).inputs["Color"], "Blackbody", kelvin)
+    gltf = export()
+    assert not gltf.lost.items
+    want = radiance(gltf, "Plain")
+    np.testing.assert_allclose(radiance(gltf), want, atol=0.02 * want.max())
+
+
+def test_animated_constants_of_lights_are_followed(blender, export):
+    import blender_scene as b
+
+    blender.context.scene.frame_end = 5
+    emission = emission_of(blender, energy=10.0)
+    flicker, warmth = feed(emission.inputs["Strength"], "Value"), feed(emission.inputs["Color"], "Blackbody")
+    b.key(flicker.outputs[0], "default_value", {1: 1.0, 5: 5.0})
+    b.key(warmth.inputs[0], "default_value", {1: 6500.0, 5: 2000.0})
+    gltf = export()
+    assert not gltf.lost.items
+    reds = [gltf.light_value("Light", "color", frame, [0, 0, 0])[0] * gltf.light_value("Light", "intensity", frame, 0.0) for frame in (1, 5)]
+    np.testing.assert_allclose(np.array(reds) * 4 * math.pi / 6830, [1.0425, 5 * 2.52], rtol=0.02)
+
+
+def test_an_emission_in_a_group_shines_as_outside(blender, export):
+    emission = emission_of(blender, energy=10.0)
+    group = blender.data.node_groups.new("Lamp", "ShaderNodeTree")
+    group.interface.new_socket("Power", in_out="INPUT", socket_type="NodeSocketFloat")
+    group.interface.new_socket("Light", in_out="OUTPUT", socket_type="NodeSocketShader")
+    inner = group.nodes.new("ShaderNodeEmission")
+    group.links.new(group.nodes.new("NodeGroupInput").outputs[0], inner.inputs["Strength"])
+    group.links.new(inner.outputs[0], group.nodes.new("NodeGroupOutput").inputs[0])
+    user = emission.id_data.nodes.new("ShaderNodeGroup")
+    user.node_tree = group
+    user.inputs[0].default_value = 3
+    emission.id_data.links.new(user.outputs[0], emission.outputs[0].links[0].to_socket)
+    gltf = export()
+    assert not gltf.lost.items
+    assert radiance(gltf)[0] == pytest.approx(683 * 30 / (4 * math.pi))
+
+
+@pytest.mark.parametrize("case", ["strength", "shader"])
+def test_other_light_nodes_are_named(blender, export, case):
+    emission = emission_of(blender, energy=10.0)
+    if case == "strength":
+        feed(emission.inputs["Strength"], "LightFalloff", 3.0)
+    else:
+        feed(emission.outputs[0].links[0].to_socket, "AddShader")
+    assert export().lost_features("Light") == ["light nodes (texture, IES or falloff)"]

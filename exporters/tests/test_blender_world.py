@@ -264,3 +264,30 @@ def test_a_turning_image_is_named_and_its_strength_followed(blender, export, tmp
     gltf = export()
     assert gltf.lost_features("World") == ["animated world nodes"]
     assert gltf.value(STRENGTH, 2, 0.0) == 2
+
+
+def test_constant_nodes_are_what_they_give(blender, export):
+    """Sampled in each frame, not baked."""
+    import blender_scene as b
+
+    background, tree = world(blender)
+    value, tint, half = (tree.nodes.new(f"ShaderNode{kind}") for kind in ("Value", "RGB", "Math"))
+    tint.outputs[0].default_value = (0.5, 0.25, 1, 1)
+    half.operation, half.inputs[1].default_value = "MULTIPLY", 0.5
+    tree.links.new(value.outputs[0], half.inputs[0])
+    tree.links.new(half.outputs[0], background.inputs["Strength"])
+    tree.links.new(tint.outputs[0], background.inputs["Color"])
+    b.key(value.outputs[0], "default_value", {1: 2.0, 2: 6.0})
+    gltf = export()
+    assert gltf.buzz["world"] == {"color": [0.5, 0.25, 1], "strength": 1}
+    assert gltf.value(STRENGTH, 2, 0.0) == 3
+    assert gltf.lost_features("World") == []
+
+
+def test_an_image_of_constant_strength_is_not_baked(blender, export, tmp_path):
+    background, tree = world(blender)
+    environment(blender, tree, background, tmp_path, ".hdr")
+    value = tree.nodes.new("ShaderNodeValue")
+    value.outputs[0].default_value = 0.5
+    tree.links.new(value.outputs[0], background.inputs["Strength"])
+    assert export().buzz["world"] == {"color": [1, 1, 1], "strength": 0.5, "image": "anim_world.hdr", "rotation": 0}
