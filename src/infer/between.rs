@@ -23,9 +23,10 @@ use crate::frame::SurfaceSample;
 /// One pixel of a row in so many is cast and asks for itself.
 const STEP: usize = 8;
 
-/// What a pixel's own share weighs against that of one beside it which has asked anew. What it knows is the mean of many frames,
-/// so that it has less noise; but where it has changed it has to follow in a few frames.
-const OWN_WEIGHT: f32 = 1.0;
+/// What a pixel's own share weighs against that of one beside it which has asked anew, and what those that landed above and below it do.
+/// What they know is the mean of many frames, so that it has less noise, and does not draw that of a row out along it; but where it
+/// has changed it has to follow in a few frames.
+const OLD_WEIGHT: f32 = 1.0 / 3.0;
 
 /// The columns of a step, counted back from its end: the one in the middle, those in the middle of its halves, and the rest.
 const BACK: [usize; STEP] = [0, 4, 6, 2, 7, 5, 3, 1];
@@ -178,11 +179,12 @@ impl Changed {
         self.agreed.iter_mut().for_each(|bits| *bits = !*bits);
         self.mean.copy_from_slice(own);
         if rays.has_shares() {
-            // Of what was known nothing is taken that may have changed.
-            let [above, below] = known(&tangent)
-                .map(|lit| lit.filter(|lit| rays.agree(own, lit)).map_or((&*own, 0.0), |lit| (lit, 1.0)));
-            let known = [(&*own, OWN_WEIGHT), (left, 1.0), (right, 1.0), above, below];
-            rays.blend(known.into_iter(), &mut self.mean);
+            // Of what was known above and below nothing is taken that may have changed.
+            let [above, below] =
+                known(&tangent).map(|lit| lit.filter(|lit| rays.agree(own, lit)).unwrap_or(own));
+            let old = [&*own, above, below].map(|lit| (lit, OLD_WEIGHT));
+            let known = old.into_iter().chain([(left, 1.0), (right, 1.0)]);
+            rays.blend(known, &mut self.mean);
         }
     }
 
