@@ -84,7 +84,7 @@ def test_pictures_have_the_shape_of_what_is_shown(across_zero: Path) -> None:
     """The contact sheet's and the report's, and what Nuke is told: 48x54 pixels of aspect 2 are 96 wide."""
     folder = review(across_zero)
     assert Image.open(folder / "sheet.png").size == (6 * 100 + 4, 2 * 58 + 4)
-    pictures = re.findall(r"data:image/\w+;base64,([\w+/=]+)", folder.with_suffix(".html").read_text())
+    pictures = re.findall(r"data:image/(?:jpeg|webp);base64,([\w+/=]+)", folder.with_suffix(".html").read_text())
     assert {Image.open(io.BytesIO(base64.b64decode(p))).size for p in pictures} == {(96, 54)}
     root = nuke_nodes((folder / "nuke.nk").read_text())[0][1]
     assert root["format"] == "48 54 0 0 48 54 2 Buzz"

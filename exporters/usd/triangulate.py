@@ -10,6 +10,9 @@ import numpy as np
 # Sine of the angle by which a corner has to turn back: less is rounding.
 _STRAIGHT = 1e-6
 
+# So near to a triangle's edge, as a share of its size, a point lies on it: the rest is rounding, which differs from machine to machine.
+_ON_EDGE = 1e-9
+
 
 def triangulate(points: np.ndarray, corners: np.ndarray, counts: np.ndarray) -> np.ndarray:
     """Of faces with `counts` corners each (3 or more): triangles (n, 3) of numbers into `corners`."""
@@ -78,6 +81,7 @@ def _turn(a: np.ndarray, b: np.ndarray, c: np.ndarray) -> np.ndarray:
 
 def _holds(a: np.ndarray, b: np.ndarray, c: np.ndarray, points: np.ndarray) -> bool:
     """Whether a triangle holds one of the points other than its corners."""
-    inside = (_turn(a, b, points) >= 0) & (_turn(b, c, points) >= 0) & (_turn(c, a, points) >= 0)
+    outside = -_ON_EDGE * np.abs([b - a, c - a]).max() ** 2
+    inside = (_turn(a, b, points) >= outside) & (_turn(b, c, points) >= outside) & (_turn(c, a, points) >= outside)
     own = (points == a).all(axis=1) | (points == b).all(axis=1) | (points == c).all(axis=1)
     return bool((inside & ~own).any())
