@@ -9,6 +9,8 @@ from .nodes import source
 
 SCALARS = ("VALUE", "INT", "BOOLEAN")
 Constant = float | np.ndarray
+# A lamp that stands nowhere: it is asked for the colour of temperatures.
+_LAMP = "blackbody"
 _LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
 _MATH = {
     "ADD": lambda a, b: a + b,
@@ -19,14 +21,6 @@ _MATH = {
     "MINIMUM": min,
     "MAXIMUM": max,
 }
-_XYZ_TO_RGB = np.array([[3.2404542, -1.5371385, -0.4985314], [-0.9692660, 1.8760108, 0.0415560], [0.0556434, -0.2040259, 1.0572252]])
-# Wyman, Sloan and Shirley, Simple Analytic Approximations to the CIE XYZ Color Matching Functions (2013): height, centre and
-# widths to both sides, in nanometres.
-_OBSERVER = (
-    ((1.056, 599.8, 37.9, 31.0), (0.362, 442.0, 16.0, 26.7), (-0.065, 501.1, 20.4, 26.2)),
-    ((0.821, 568.8, 46.9, 40.5), (0.286, 530.9, 16.3, 31.1)),
-    ((1.217, 437.0, 11.8, 36.0), (0.681, 459.0, 26.0, 13.8)),
-)
 
 
 def constant(socket: bpy.types.NodeSocket) -> Constant | None:
@@ -62,17 +56,13 @@ def converted(value: Constant, start: str, end: str) -> Constant:
     return float(_LUMINANCE @ value if start == "RGBA" else np.mean(value))
 
 
-def blackbody(temperature: float) -> np.ndarray:
-    """The colour of Blender's Blackbody node: Planck's law as an eye sees it, of luminance 1."""
-    temperature = min(max(temperature, 800.0), 12000.0)
-    wave = np.arange(380.0, 781.0)
-    shone = wave**-5 / np.expm1(1.4387769e7 / (wave * temperature))
-    xyz = np.array([sum(_lobe(wave, *lobe) for lobe in lobes) @ shone for lobes in _OBSERVER])
-    return np.maximum(_XYZ_TO_RGB @ (xyz / xyz[1]), 0.0)
-
-
-def _lobe(wave: np.ndarray, height: float, centre: float, left: float, right: float) -> np.ndarray:
-    return height * np.exp(-0.5 * ((wave - centre) / np.where(wave < centre, left, right)) ** 2)
+def blackbody(temperature: float) -> np.ndarray | None:
+    """The colour of a Blackbody node, as Blender has it of a lamp; None in those that know no temperature of lamps."""
+    lamp = bpy.data.lights.get(_LAMP) or bpy.data.lights.new(_LAMP, "POINT")
+    if not hasattr(lamp, "temperature_color"):
+        return None
+    lamp.use_temperature, lamp.temperature = True, temperature
+    return np.array(lamp.temperature_color)
 
 
 def _output(out: bpy.types.NodeSocket) -> Constant | None:

@@ -2,7 +2,9 @@
 //!
 //! Answers are on the safe side: what cannot be told apart from something inside, by single precision, counts as inside.
 
-use super::wide::WideNode;
+use super::tree::Tree;
+use super::wide::{Pending, WideNode};
+use super::{Accel, Placed};
 use glam::{Vec3A, Vec4};
 
 /// What the rounding of a point's distance from a plane may come to, of the largest coordinate in it.
@@ -24,7 +26,7 @@ pub(super) struct Convex<const PLANES: usize> {
 }
 
 /// The planes, made ready for boxes.
-pub(super) struct Slabs<const PLANES: usize> {
+struct Slabs<const PLANES: usize> {
     normals: [[Vec4; 3]; PLANES],
     /// For each plane and axis: 1 if boxes' maxima lie farthest along the normal.
     far: [[usize; 3]; PLANES],
@@ -45,7 +47,7 @@ impl Outline {
 }
 
 impl<const PLANES: usize> Slabs<PLANES> {
-    pub fn new(of: &Convex<PLANES>) -> Self {
+    fn new(of: &Convex<PLANES>) -> Self {
         let offset = |(normal, distance): (&Vec3A, &f32)| distance - normal.dot(of.eye) + of.rounding;
         let mut offsets = of.normals.iter().zip(&of.distances).map(offset).map(Vec4::splat);
         Self {
@@ -57,7 +59,7 @@ impl<const PLANES: usize> Slabs<PLANES> {
 
     /// A bit for each of the eight boxes that may reach into the space.
     #[inline(always)]
-    pub fn meet(&self, node: &WideNode) -> u32 {
+    fn meet(&self, node: &WideNode) -> u32 {
         let mut mask = 0;
         for half in 0..2 {
             let mut inside = 0b1111;
@@ -74,7 +76,7 @@ impl<const PLANES: usize> Slabs<PLANES> {
 
 impl<const PLANES: usize> Convex<PLANES> {
     /// A bit for each of four triangles that no single plane keeps out, and what rounding may come to on each.
-    pub fn may_hold(&self, corners: &[[Vec4; 3]; 3]) -> (u32, Vec4) {
+    fn may_hold(&self, corners: &[[Vec4; 3]; 3]) -> (u32, Vec4) {
         let mut reach = Vec4::splat(self.eye.abs().max_element());
         for axis in corners.iter().flatten() {
             reach = reach.max(axis.abs());
@@ -121,5 +123,54 @@ impl<const PLANES: usize> Convex<PLANES> {
             }
         }
         outline
+    }
+}
+
+impl Tree {
+    /// True if `is` is true for any triangle that no single plane keeps out of `space`, which is in the tree's own: given its flags,
+    /// its corners from the eye, and what rounding may come to on it.
+    pub fn any_within<const PLANES: usize>(
+        &self,
+        space: &Convex<PLANES>,
+        pending: &mut [Pending],
+        mut is: impl FnMut(u32, [Vec3A; 3], f32) -> bool,
+    ) -> bool {
+        let slabs = Slabs::new(space);
+        self.wide.any(
+            |node| slabs.meet(node),
+            pending,
+            |leaf, _| {
+                let pack = &self.leaves[leaf];
+                let (mask, rounding) = space.may_hold(pack.corners());
+                let mut inside = (0..4).filter(|lane| mask >> lane & 1 == 1);
+                inside.any(|lane| {
+                    is(pack.flags(lane), pack.triangle(lane).map(|corner| corner - space.eye), rounding[lane])
+                })
+            },
+        )
+    }
+}
+
+impl Accel {
+    /// True if `is` is true for anything placed whose box may reach into a `space` of render space.
+    pub(super) fn any_placed_within<const PLANES: usize>(
+        &self,
+        space: impl FnOnce() -> Convex<PLANES>,
+        mut is: impl FnMut(&Placed, &mut [Pending]) -> bool,
+    ) -> bool {
+        self.with_pending(|pending| {
+            // Scenes that stand still are one tree: there is nothing to choose from.
+            if let [only] = self.placed.as_slice() {
+                return is(only, pending);
+            }
+            let slabs = Slabs::new(&space());
+            self.upper.any(
+                |node| slabs.meet(node),
+                pending,
+                |leaf, pending| {
+                    self.placed[self.upper_leaves[leaf].clone()].iter().any(|placed| is(placed, pending))
+                },
+            )
+        })
     }
 }

@@ -4,7 +4,7 @@
 //! is not a triangle, counts as in it; rays will tell. After beam tracing (Heckbert and Hanrahan 1984), which is much harder, as it asks
 //! what is in a beam, not whether anything is.
 
-use super::convex::{Convex, ROUNDING, Slabs};
+use super::convex::{Convex, ROUNDING};
 use super::opacity::{CULL_BACK, EYE_PASS, MIRRORED};
 use super::wide::Pending;
 use super::{Accel, Placed, PlacedTree};
@@ -69,44 +69,21 @@ impl Accel {
         if !self.endless.is_empty() {
             return false;
         }
-        !self.with_pending(|pending| {
-            if let [Placed::Tree(only)] = self.placed.as_slice() {
-                return self.holds(only, frustum, pending);
-            }
-            let slabs = Slabs::new(&frustum.within(&Affine3A::IDENTITY));
-            self.upper.any(
-                |node| slabs.meet(node),
-                pending,
-                |leaf, pending| {
-                    self.placed[self.upper_leaves[leaf].clone()].iter().any(|placed| match placed {
-                        Placed::Tree(tree) => self.holds(tree, frustum, pending),
-                        Placed::Shape(_) => true,
-                    })
-                },
-            )
+        let space = || frustum.within(&Affine3A::IDENTITY);
+        !self.any_placed_within(space, |placed, pending| match placed {
+            Placed::Tree(tree) => self.holds(tree, frustum, pending),
+            Placed::Shape(_) => true,
         })
     }
 
     /// True if anything of one placed group may stand in the frustum.
     fn holds(&self, placed: &PlacedTree, frustum: &Frustum, pending: &mut [Pending]) -> bool {
-        let (tree, _) = self.lower(placed);
         let space = frustum.within(&placed.object_from_render);
-        let slabs = Slabs::new(&space);
-        tree.wide.any(
-            |node| slabs.meet(node),
-            pending,
-            |leaf, _| {
-                let pack = &tree.leaves[leaf];
-                let (mask, rounding) = space.may_hold(pack.corners());
-                (0..4).filter(|lane| mask >> lane & 1 == 1).any(|lane| {
-                    let flags = pack.flags(lane);
-                    let triangle = pack.triangle(lane).map(|corner| corner - space.eye);
-                    flags & EYE_PASS == 0
-                        && !(flags & CULL_BACK != 0 && sees_back(triangle, flags & MIRRORED != 0))
-                        && !space.cut(triangle, rounding[lane]).corners().is_empty()
-                })
-            },
-        )
+        self.lower(placed).0.any_within(&space, pending, |flags, triangle, rounding| {
+            flags & EYE_PASS == 0
+                && !(flags & CULL_BACK != 0 && sees_back(triangle, flags & MIRRORED != 0))
+                && !space.cut(triangle, rounding).corners().is_empty()
+        })
     }
 }
 

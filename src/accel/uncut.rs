@@ -1,8 +1,7 @@
 //! What the near or far plane of one view cut off, and another view sees.
 
-use super::convex::{Convex, MOST_CORNERS, ROUNDING, Slabs};
-use super::wide::Pending;
-use super::{Accel, Placed, PlacedTree};
+use super::convex::{Convex, MOST_CORNERS, ROUNDING};
+use super::{Accel, Placed};
 use crate::scene::{Scene, Shape, View};
 use glam::{Affine3A, DMat3, DVec3, Mat3, Vec3, Vec3A};
 
@@ -63,58 +62,28 @@ impl Accel {
 
     /// Visits what of all triangles lies in a slab.
     fn outlines(&self, slab: &Slab, visit: &(dyn Fn(&[Vec3]) + Sync)) {
-        self.with_pending(|pending| {
-            let slabs = Slabs::new(&slab.within(&Affine3A::IDENTITY));
-            self.upper.any(
-                |node| slabs.meet(node),
-                pending,
-                |leaf, pending| {
-                    for placed in &self.placed[self.upper_leaves[leaf].clone()] {
-                        if let Placed::Tree(tree) = placed {
-                            self.outlines_in(tree, slab, pending, visit);
-                        }
-                    }
+        let space = || slab.within(&Affine3A::IDENTITY);
+        self.any_placed_within(space, |placed, pending| {
+            if let Placed::Tree(placed) = placed {
+                let render_from_object = placed.object_from_render.inverse();
+                let space = slab.within(&placed.object_from_render);
+                self.lower(placed).0.any_within(&space, pending, |_, triangle, rounding| {
+                    space.visit_cut(triangle, rounding, &render_from_object, visit);
                     false
-                },
-            )
+                });
+            }
+            false
         });
-    }
-
-    /// Visits what of the triangles of one placed group lies in a slab.
-    fn outlines_in(
-        &self,
-        placed: &PlacedTree,
-        slab: &Slab,
-        pending: &mut [Pending],
-        visit: &(dyn Fn(&[Vec3]) + Sync),
-    ) {
-        let (tree, _) = self.lower(placed);
-        let render_from_object = placed.object_from_render.inverse();
-        let space = slab.within(&placed.object_from_render);
-        let slabs = Slabs::new(&space);
-        tree.wide.any(
-            |node| slabs.meet(node),
-            pending,
-            |leaf, _| {
-                let pack = &tree.leaves[leaf];
-                let (mask, rounding) = space.may_hold(pack.corners());
-                for lane in (0..4).filter(|lane| mask >> lane & 1 == 1) {
-                    let triangle = pack.triangle(lane).map(|corner| corner - space.eye);
-                    space.visit_cut(triangle, rounding[lane], &render_from_object, visit);
-                }
-                false
-            },
-        );
     }
 
     /// Visits what of all flat shapes lies in a slab, and the boxes around others.
     fn outlines_of_shapes(&self, scene: &Scene, slab: &Slab, visit: &(dyn Fn(&[Vec3]) + Sync)) {
+        let space = slab.within(&Affine3A::IDENTITY);
         for (instance, placement) in scene.instances.iter().zip(&self.placements) {
             let Some(shape) = scene.meshes[instance.mesh].shape.as_ref().filter(|_| placement.present) else {
                 continue;
             };
             let place = |p: Vec3| placement.render_from_object.transform_point3(p);
-            let space = slab.within(&Affine3A::IDENTITY);
             for triangle in shape.sheet() {
                 let triangle = triangle.map(|p| Vec3A::from(place(p)) - space.eye);
                 let reach = triangle.iter().fold(Vec3A::ZERO, |r, p| r.max(p.abs())).max_element();

@@ -162,7 +162,7 @@ impl Changed {
     }
 
     /// Finds out on which lights column `x` of `row` agrees with the two pixels between which it lies, which have been asked: on
-    /// none if either shows another surface. Shares are averaged with those of them, and with what was known `above` and below.
+    /// none if either shows another surface. Shares are averaged with theirs, and with what was `known` above and below.
     pub fn compare<'o>(
         &mut self,
         row: &mut Row<'_>,

@@ -243,8 +243,8 @@ impl<'a> Resolver<'a> {
         };
         let raster = |view: &View, p: DVec4| view.raster_from_world(self.origin) * p;
         let (a, b) = (raster(&self.shot.view, here), raster(&other.view, there));
-        // What has come behind the other eye has left the image on its way: it moves towards where it passed the near plane.
-        let near = other.view.lens.near.max(NEAREST * a.w).min(a.w);
+        // What has come behind the other eye has left the image on its way: it moves towards where it passed the eye.
+        let near = NEAREST * a.w;
         let b = if b.w < near && a.w > b.w { a.lerp(b, (a.w - near) / (a.w - b.w)) } else { b };
         if a.w > 0.0 && b.w > 0.0 {
             [(b.x / b.w - a.x / a.w) as f32, (a.y / a.w - b.y / b.w) as f32]

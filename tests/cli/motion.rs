@@ -155,3 +155,21 @@ fn a_camera_on_twos_is_not_cut_and_one_that_jumps_is() {
     let plan: Value = serde_json::from_str(&plan.out).unwrap();
     assert_eq!(plan["cuts"], serde_json::json!([14]));
 }
+
+#[test]
+fn the_sky_moves_as_a_camera_turns_whatever_its_near_plane() {
+    let (folder, out) = fresh();
+    let mut stage = Stage::new();
+    stage.json["cameras"][0]["perspective"]["znear"] = serde_json::json!(3.0);
+    stage.turn(CAMERA, &[-0.1, 0.0, 0.1]);
+    let scene = stage.write(&folder.path().join("s.gltf"));
+    run(&scene, &out, "-r 64x36 --aov motion,depth -q full").ok();
+    let frame = channels(&out.join("s.0001.exr"));
+    let sky = |i: &usize| frame["depth.Z"][*i] >= 1e10;
+    // A tenth of a radian of a view that is 0.7 high: in the middle some 5 pixels, more at the sides.
+    for i in (0..64 * 36).filter(sky) {
+        let u = frame["forward.u"][i];
+        assert!(u > 4.0 && u < 8.0, "{i}: {u}");
+    }
+    assert!((0..64 * 36).filter(sky).count() > 200);
+}

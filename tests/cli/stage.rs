@@ -61,6 +61,14 @@ impl Stage {
         self.animate(path.len(), output, "LINEAR", json!({"node": node, "path": "translation"}));
     }
 
+    /// Turns `node` about the vertical to one angle after the other, radians to the left, a frame each.
+    pub fn turn(&mut self, node: usize, path: &[f32]) {
+        let turns: Vec<f32> =
+            path.iter().flat_map(|a| [0.0, (a / 2.0).sin(), 0.0, (a / 2.0).cos()]).collect();
+        let output = self.floats("VEC4", &turns);
+        self.animate(path.len(), output, "LINEAR", json!({"node": node, "path": "rotation"}));
+    }
+
     /// Gives what a JSON pointer names one value after the other, a frame each.
     pub fn change(&mut self, pointer: &str, values: &[f32]) {
         let output = self.floats("SCALAR", values);
@@ -111,7 +119,11 @@ impl Stage {
     }
 
     fn floats(&mut self, kind: &str, values: &[f32]) -> usize {
-        let width = if kind == "VEC3" { 3 } else { 1 };
+        let width = match kind {
+            "VEC4" => 4,
+            "VEC3" => 3,
+            _ => 1,
+        };
         let bytes: Vec<u8> = values.iter().flat_map(|v| v.to_le_bytes()).collect();
         let accessor = self.accessor(kind, 5126, values.len() / width, &bytes);
         // A POSITION accessor must have bounds; any will do for a time.
