@@ -2,6 +2,7 @@
 //! one.
 
 use glam::{BVec4A, Vec3, Vec4};
+use std::f32::consts::{FRAC_PI_2, PI};
 use std::ops::{Add, AddAssign, BitAnd, BitOr, Mul, Neg, Sub};
 
 /// How many.
@@ -37,6 +38,16 @@ impl Vec3x4 {
     #[inline]
     pub fn dot(self, other: Self) -> Vec4 {
         self.x * other.x + self.y * other.y + self.z * other.z
+    }
+
+    /// The cross product of each with its own other one.
+    #[inline]
+    pub fn cross(self, other: Self) -> Self {
+        Self {
+            x: self.y * other.z - self.z * other.y,
+            y: self.z * other.x - self.x * other.z,
+            z: self.x * other.y - self.y * other.x,
+        }
     }
 
     /// The square of each one's length.
@@ -125,6 +136,30 @@ impl Mul<Vec4> for Vec3x4 {
     }
 }
 
+/// The angles, 0 to pi, of which `sines` and `cosines` are the sine, not negative, and the cosine, both times any one length.
+///
+/// Within 1e-6 by a polynomial for the arc tangent (Abramowitz and Stegun 1964, 4.4.49).
+#[inline]
+pub(super) fn angles(sines: Vec4, cosines: Vec4) -> Vec4 {
+    const TERMS: [f32; 8] = [
+        0.002_866_225_7,
+        -0.016_165_737,
+        0.042_909_614,
+        -0.075_289_64,
+        0.106_562_64,
+        -0.142_088_99,
+        0.199_935_51,
+        -0.333_331_45,
+    ];
+    let along = cosines.abs();
+    let tangents = sines.min(along) / sines.max(along);
+    let square = tangents * tangents;
+    let series = TERMS.iter().fold(Vec4::ZERO, |sum, &term| sum * square + term);
+    let acute = tangents + tangents * square * series;
+    let acute = Vec4::select(sines.cmpgt(along), FRAC_PI_2 - acute, acute);
+    Vec4::select(cosines.cmplt(Vec4::ZERO), PI - acute, acute)
+}
+
 /// Some of the lanes.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Lanes(BVec4A);
@@ -208,4 +243,21 @@ const fn masks() -> [BVec4A; 1 << LANES] {
         bits += 1;
     }
     masks
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn angles_are_those_of_the_arc_tangent() {
+        for i in 0..=4000 {
+            let angle = f64::from(i) / 4000.0 * std::f64::consts::PI;
+            for length in [1e-12, 1.0, 1e12] {
+                let (sine, cosine) = ((angle.sin() * length) as f32, (angle.cos() * length) as f32);
+                let found = angles(Vec4::splat(sine), Vec4::splat(cosine)).x;
+                assert!((f64::from(found) - angle).abs() < 1e-6, "{angle} {found}");
+            }
+        }
+    }
 }

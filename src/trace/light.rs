@@ -1,24 +1,21 @@
 //! What arrives from lights: punctual ones as `KHR_lights_punctual` has them, and those that have a size.
 
-use super::form_factor::{MOST_CORNERS, disc_share, polygon};
-use super::sequence::{MIDDLE, cone, disc};
+use super::form_factor::disc_share;
+use super::lanes::Vec3x4;
+use super::panel::Panel;
+use super::parts::{GRID, Middles, SkyDisc};
+use super::sequence::{MIDDLE, cone};
 use crate::frame::Way;
-use crate::scene::{LightKind, Outline, PosedLight};
-use glam::{DVec3, Vec2, Vec3};
+use crate::scene::{LightKind, PosedLight};
+use glam::{DVec3, Vec2, Vec3, Vec4};
 use std::f32::consts::{PI, TAU};
 
 /// Nearer than this a light without size grows no brighter, metres: the inverse square would overflow. Far less than what
 /// is seen of a scene that is a millionth of a metre across.
 pub(super) const MIN_DISTANCE: f32 = 1e-10;
 
-/// An area light that covers less than this, in steradians, shines as if from its middle.
-const POINT_LIKE: f32 = 1e-6;
-
 /// A spot's cone that changes less than this over its sphere, before it is squared, is taken at the sphere's middle.
 const LEVEL_CONE: f32 = 0.05;
-
-/// Rows of the finest grid over a light by which its cone, or a highlight, is averaged.
-pub(super) const GRID: u32 = 4;
 
 /// A light prepared for many points.
 #[derive(Debug, Clone)]
@@ -52,22 +49,6 @@ pub(super) struct Cone {
     pub direction: Vec3,
     pub scale: f32,
     pub offset: f32,
-}
-
-/// A flat light that shines from one side.
-#[derive(Debug, Clone)]
-pub(super) struct Panel {
-    middle: Vec3,
-    /// Half of its width and half of its height.
-    right: Vec3,
-    up: Vec3,
-    facing: Vec3,
-    /// Square metres.
-    area: f32,
-    outline: Outline,
-    /// Around the middle; those of a polygon of the same area for an ellipse.
-    corners: [DVec3; MOST_CORNERS],
-    corner_count: usize,
 }
 
 /// Light from one point of an emitter.
@@ -192,10 +173,7 @@ impl Emitter {
                 let sin = (radius / distance).min(1.0);
                 strength *= disc_share(normal.dot(axis), sin);
                 match cone {
-                    Some(cone) if cone.scale * sin > LEVEL_CONE => {
-                        let part = |u| sphere_part(u, axis, distance, *radius).0;
-                        strength *= cone.mean(normal, grid(GRID).map(part));
-                    }
+                    Some(cone) if cone.scale * sin > LEVEL_CONE => strength *= cone.mean(normal, axis, sin),
                     Some(cone) => strength *= cone.at(axis),
                     None => {}
                 }
@@ -211,20 +189,6 @@ impl Emitter {
         let irradiance = self.intensity * strength;
         (irradiance.max_element() > 0.0 && to_light.x.is_finite())
             .then_some(Unshadowed { irradiance, to_light })
-    }
-
-    /// The mean of `value`, which is given directions to the light, over a grid of `rows` x `rows` parts of it, each
-    /// weighed by what it brings.
-    pub fn mean(&self, point: Vec3, normal: Vec3, rows: u32, value: impl Fn(Vec3) -> Vec3) -> Vec3 {
-        let (mut sum, mut all) = (Vec3::ZERO, 0.0);
-        for arriving in grid(rows).filter_map(|u| self.arriving(point, u)) {
-            let weight = arriving.irradiance.max_element() * normal.dot(arriving.to_light);
-            if weight > 0.0 {
-                sum += weight * value(arriving.to_light);
-                all += weight;
-            }
-        }
-        if all > 0.0 { sum / all } else { Vec3::ZERO }
     }
 
     /// Solid angle, about.
@@ -280,76 +244,39 @@ impl Cone {
         angular * angular
     }
 
-    /// The mean over parts of a sphere, given as directions to them, each weighed by its cosine.
-    fn mean(&self, normal: Vec3, parts: impl Iterator<Item = Vec3>) -> f32 {
-        let (mut sum, mut all) = (0.0, 0.0);
-        for to_light in parts {
-            let cos = normal.dot(to_light).max(0.0);
-            sum += cos * self.at(to_light);
-            all += cos;
+    /// [`Cone::at`] for four directions.
+    pub fn at_four(&self, to_lights: Vec3x4) -> Vec4 {
+        let cosines = -to_lights.dot(Vec3x4::splat(self.direction));
+        let angular = (cosines * self.scale + self.offset).clamp(Vec4::ZERO, Vec4::ONE);
+        angular * angular
+    }
+
+    /// The mean over parts of a sphere around `axis`, `sin` the sine of the half angle that it fills, each weighed by its cosine.
+    fn mean(&self, normal: Vec3, axis: Vec3, sin: f32) -> f32 {
+        // Most spheres lie within the inner cone, or outside of the outer one.
+        let middle = -self.direction.dot(axis) * self.scale + self.offset;
+        let most = self.scale * (2.0 * height(sin)).sqrt();
+        if middle - most >= 1.0 {
+            return 1.0;
         }
+        if middle + most <= 0.0 {
+            return 0.0;
+        }
+        let disc = SkyDisc::new(axis, sin);
+        let (mut sum, mut all) = (Vec4::ZERO, Vec4::ZERO);
+        for middles in Middles::of(GRID) {
+            let to_lights = disc.directions(middles);
+            let cosines = to_lights.dot(Vec3x4::splat(normal)).max(Vec4::ZERO);
+            sum += cosines * self.at_four(to_lights);
+            all += cosines;
+        }
+        let (sum, all) = (sum.element_sum(), all.element_sum());
         if all > 0.0 { sum / all } else { 0.0 }
     }
 }
 
-impl Panel {
-    fn new(light: &PosedLight, middle: Vec3, outline: Outline, size: Vec2) -> Self {
-        let right = light.right * f64::from(size.x) / 2.0;
-        let up = light.right.cross(light.direction) * f64::from(size.y) / 2.0;
-        let mut corners = [DVec3::ZERO; MOST_CORNERS];
-        let (corner_count, area) = match outline {
-            Outline::Rectangle => {
-                corners[..4].copy_from_slice(&[right + up, up - right, -right - up, right - up]);
-                (4, size.x * size.y)
-            }
-            Outline::Ellipse => {
-                let step = std::f64::consts::TAU / MOST_CORNERS as f64;
-                // A polygon inside a circle has less than its area.
-                let reach = (step / step.sin()).sqrt();
-                for (i, corner) in corners.iter_mut().enumerate() {
-                    let (sin, cos) = (step * i as f64).sin_cos();
-                    *corner = (right * cos + up * sin) * reach;
-                }
-                (MOST_CORNERS, size.x * size.y * PI / 4.0)
-            }
-        };
-        let (right, up, facing) = (right.as_vec3(), up.as_vec3(), light.direction.as_vec3());
-        Self { middle, right, up, facing, area, outline, corners, corner_count }
-    }
-
-    fn at(&self, u: Vec2) -> Vec3 {
-        let p = match self.outline {
-            Outline::Rectangle => 2.0 * u - Vec2::ONE,
-            Outline::Ellipse => disc(u),
-        };
-        self.middle + self.right * p.x + self.up * p.y
-    }
-
-    /// Irradiance for 1 W/sr straight ahead.
-    fn irradiance(&self, point: Vec3, normal: Vec3) -> f32 {
-        let along = self.middle - point;
-        let height = -self.facing.dot(along);
-        if height <= 0.0 {
-            return 0.0;
-        }
-        let square = along.length_squared().max(MIN_DISTANCE * MIN_DISTANCE);
-        if self.area < POINT_LIKE * square {
-            // cos cos / d^2, neither cosine divided by its length yet.
-            return height * normal.dot(along).max(0.0) / (square * square);
-        }
-        let middle = along.as_dvec3();
-        let corners = self.corners[..self.corner_count].iter().map(|c| middle + c);
-        polygon(corners, normal.as_dvec3()) as f32 / self.area
-    }
-}
-
-/// The middles of `rows` x `rows` parts of the unit square.
-fn grid(rows: u32) -> impl Iterator<Item = Vec2> {
-    (0..rows * rows).map(move |i| (Vec2::new((i % rows) as f32, (i / rows) as f32) + MIDDLE) / rows as f32)
-}
-
 /// 1 less the cosine of the angle with this sine.
-fn height(sin: f32) -> f32 {
+pub(super) fn height(sin: f32) -> f32 {
     sin * sin / (1.0 + (1.0 - sin * sin).sqrt())
 }
 

@@ -2,10 +2,10 @@
 
 use super::delta_lights::{DeltaLights, Unshadowed4};
 use super::ggx::{dielectric, lobes, schlick_weights};
+use super::highlight::MIN_LOBE;
 use super::interaction::SurfaceInteraction;
 use super::lanes::{LANES, Lanes, Vec3x4};
 use super::surface::Surface;
-use super::whitted::MIN_LOBE;
 use glam::{Vec3, Vec4};
 use std::array;
 

@@ -1,10 +1,10 @@
 //! What leaves a surface towards the eye, and the rays that have to be followed to know it.
 
 use super::delta_lights::DeltaLights;
-use super::ggx::{density, environment_share, lobes, refract};
+use super::ggx::{environment_share, refract};
 use super::interaction::{Beam, SurfaceInteraction};
-use super::lanes::{Lanes, Vec3x4};
-use super::light::{Emitter, GRID, Unshadowed};
+use super::lanes::Lanes;
+use super::light::{Emitter, Unshadowed};
 use super::point::{Side, SurfacePoint};
 use super::receivers::{Brought, Receivers};
 use super::surface::Surface;
@@ -12,15 +12,11 @@ use super::visibility::Inquiry;
 use super::{Radiance, Tracer};
 use crate::accel::{Ray, Sides};
 use crate::frame::{RayCounts, SurfaceSample};
-use glam::{Vec3, Vec4};
-use std::f32::consts::{FRAC_1_PI, TAU};
+use glam::Vec3;
+use std::f32::consts::FRAC_1_PI;
 
 /// A ray is followed only if it carries more than this share of what it finds to the pixel.
 const MIN_SHARE: f32 = 1.0 / 256.0;
-
-/// A highlight is left out where its lobe has less density than this, 1/sr: but for grazing angles it would add less
-/// than 1e-4 of what a white diffuse surface does.
-pub(super) const MIN_LOBE: f32 = 1e-4;
 
 /// Says which shadow bits a point of a surface has, where that is known without a ray.
 pub type KnownLight<'k> = dyn Fn(&SurfaceSample) -> Option<&'k [u32]> + Sync + 'k;
@@ -128,60 +124,6 @@ impl Incoming {
         self.irradiance += unshadowed.irradiance * share;
         self.highlights += surface.highlight(it, toward, light, unshadowed) * share;
     }
-}
-
-impl Surface {
-    /// The highlight of a light that has a size, nothing in its way.
-    fn highlight(
-        &self,
-        it: &SurfaceInteraction,
-        toward: Vec3,
-        light: &Emitter,
-        unshadowed: &Unshadowed,
-    ) -> Vec3 {
-        if !self.has_highlights() {
-            return Vec3::ZERO;
-        }
-        let mirrored = |alpha: f32, to_light: Vec3| {
-            let lights = (Vec3x4::splat(to_light), Vec4::splat(it.normal.dot(to_light)));
-            let [normal, toward] = [it.normal, toward].map(Vec3x4::splat);
-            match lobes(normal, toward, lights, Vec4::splat(alpha), MIN_LOBE, Lanes::ALL) {
-                Some((lobes, cos)) => unshadowed.irradiance * lobes.x * self.fresnel(cos.x),
-                None => Vec3::ZERO,
-            }
-        };
-        // A light is cut in parts narrower than the lobe, as far as a few will do, and the lobe is widened by their size.
-        let position = it.point.position;
-        let spread = light.solid_angle(position) / TAU;
-        let rows = (4.0 * spread.sqrt() / self.alpha).ceil().clamp(1.0, GRID as f32);
-        let alpha = (self.alpha * self.alpha + spread / (rows * rows)).sqrt();
-        let middle = unshadowed.to_light;
-        if rows == 1.0 {
-            return if it.normal.dot(middle) > 0.0 { mirrored(alpha, middle) } else { Vec3::ZERO };
-        }
-        if !may_mirror(it.normal, toward, middle, light.chord(position), alpha) {
-            return Vec3::ZERO;
-        }
-        light.mean(position, it.normal, rows as u32, |to_light| mirrored(alpha, to_light))
-    }
-}
-
-/// False if no direction that is within `chord` of `light`, all of them unit vectors, has a lobe that counts.
-fn may_mirror(normal: Vec3, view: Vec3, light: Vec3, chord: f32, alpha: f32) -> bool {
-    let half = view + light;
-    let length = half.length();
-    // The half vector moves by no more than the light does: so far at most does it turn.
-    let sin = chord / length;
-    if sin.is_nan() || sin >= 1.0 {
-        return true;
-    }
-    let turn = (sin, (1.0 - sin * sin).sqrt());
-    let cos = normal.dot(half) / length;
-    if cos >= turn.1 {
-        return true;
-    }
-    let nearest = cos * turn.1 + (1.0 - cos * cos).max(0.0).sqrt() * turn.0;
-    density(nearest.max(0.0).powi(2), alpha * alpha) >= MIN_LOBE
 }
 
 impl Tracer<'_> {
