@@ -139,7 +139,7 @@ impl CastCentres for Caster<'_> {
 
     fn is_hidden(&self, sample: &SurfaceSample, counts: &mut RayCounts) -> bool {
         counts.visibility += 1;
-        self.tracer.is_hidden(&self.eye, sample)
+        self.tracer.may_be_hidden(&self.eye, sample)
     }
 
     fn sees_all(
