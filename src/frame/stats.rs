@@ -17,7 +17,8 @@ pub struct RayCounts {
     /// Refracted (or passing through blended surfaces) and all that follow from them, shadow rays included.
     pub refraction: u64,
     /// From the eye to a stored sample, to prove it visible: what `verified` reuses, but for tiles that are proven at one look; of
-    /// `centred` one in 1024 or in 256, one in four at the image's sides, and what may be hidden beside what was cast.
+    /// `centred` one in 1024 or in 256, one in 16 on what has moved, one in four at the image's sides and one in eight of what may have come in there, and what may be hidden beside
+    /// what was cast.
     pub visibility: u64,
 }
 

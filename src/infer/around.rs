@@ -24,7 +24,8 @@ pub enum Trust {
     /// Shadow bits on which all that is known around agrees; reused samples beside which no ray met anything unknown, but for
     /// a few that a ray proves visible, so that nothing new stays unseen for long.
     Neighbours,
-    /// Shadow bits on which the whole neighbourhood is known to agree; reused samples that a ray has proven visible.
+    /// Shadow bits on which the whole neighbourhood is known to agree; reused samples that have been proven visible, by a ray
+    /// or with all of a tile.
     Proof,
 }
 
@@ -255,17 +256,17 @@ impl<'a> Tangent<'a> {
         (other.normal == self.sample.normal || faces_alike()) && self.reaches(other)
     }
 
-    /// True if `other` may lend, and is of the same instance: the bars of a window and the panes behind them are two things,
-    /// though they are within a pixel's width.
+    /// True if `other` may lend, or lies on the same face.
     pub fn is_one_thing_with(&self, other: &SurfaceSample) -> bool {
-        let own = &self.sample;
-        let is_same_face = other.surface.primitive == own.surface.primitive && other.normal == own.normal;
-        other.surface.instance == own.surface.instance && (is_same_face || self.may_lend(other))
+        let face =
+            |sample: &SurfaceSample| (sample.surface.instance, sample.surface.primitive, sample.normal);
+        face(other) == face(&self.sample) || self.may_lend(other)
     }
 
     /// See [`is_one_surface`].
     fn reaches(&self, other: &SurfaceSample) -> bool {
-        if self.sample.object != other.object {
+        // The bars of a window and the panes behind them are two things, though of one object and within a pixel's width.
+        if self.sample.surface.instance != other.surface.instance {
             return false;
         }
         if self.sample.surface.is_background() {
@@ -281,7 +282,7 @@ impl<'a> Tangent<'a> {
     }
 }
 
-/// True where two samples lie on one surface, with no step between them.
+/// True where two samples lie on one surface: of one instance, with no step between them that is larger than the side of a pixel there.
 pub fn is_one_surface(a: &SurfaceSample, b: &SurfaceSample, view: &Projector) -> bool {
     Tangent::new(*a, view).reaches(b)
 }

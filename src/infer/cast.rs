@@ -3,9 +3,10 @@
 
 use super::around::{Around, Lent, Tangent, Trust, is_one_surface};
 use super::between::{self, Changed, Steps};
-use super::buzz_buffer::{BuzzBuffer, Row, UNKNOWN};
+use super::buzz_buffer::{BuzzBuffer, Row, UNKNOWN, pixels_around};
 use super::cell::growth;
 use super::centre::CastCentres;
+use super::entering::KnownArea;
 use super::moved::Askers;
 use super::projector::Projector;
 use super::shares::{carry, spare};
@@ -13,6 +14,7 @@ use super::sources::Sources;
 use super::tiles::Tiles;
 use crate::frame::{PixelClass, RayCounts, SurfaceSample};
 use rayon::prelude::*;
+use std::ops::Range;
 
 /// One pixel in so many, on either axis, is proven visible whatever is known about it, and asks all lights.
 ///
@@ -21,7 +23,7 @@ use rayon::prelude::*;
 /// outline.
 const LOOKOUT: usize = 32;
 
-/// One pixel in so many where what is seen has grown so much that such things do, or does not say: where nothing landed, and in the
+/// The same where what is seen has grown so much that such things do, or does not say: where nothing landed, and in the
 /// background.
 const NEAR_LOOKOUT: usize = 16;
 
@@ -29,9 +31,13 @@ const NEAR_LOOKOUT: usize = 16;
 /// what a camera turns around, lands nowhere and leaves no pixel empty.
 const SIDE_LOOKOUT: usize = 4;
 
-/// One pixel in so many on what has moved. Where it turns or folds, what comes before its own surface lies within the voxels that
+/// The same on what has moved. Where it turns or folds, what comes before its own surface lies within the voxels that
 /// the line to the eye begins in, and they say nothing.
 const BODY_LOOKOUT: usize = 4;
+
+/// The same of what has been filled in between pixels that were cast in the frame before, and of the contested area at the image's sides,
+/// where what is nearer than what is behind it comes in farther than to the outermost pixels.
+const NEW_LOOKOUT: usize = 8;
 
 /// The growth in a frame, by coming nearer or by zooming, from which what is seen grows fast.
 const FAST: f32 = 1.03;
@@ -56,6 +62,11 @@ impl Grid {
         x % step == self.first.0 % step && y % step == self.first.1 % step
     }
 
+    /// True at one pixel in [`NEW_LOOKOUT`], so that three by three hold one.
+    fn has_new(self, (x, y): (usize, usize)) -> bool {
+        (x + 3 * y) % NEW_LOOKOUT == (self.first.0 + self.first.1) % NEW_LOOKOUT
+    }
+
     /// True at one pixel in [`SIDE_LOOKOUT`] of each row and each column.
     fn has_side(self, (x, y): (usize, usize)) -> bool {
         (x + y) % SIDE_LOOKOUT == (self.first.0 + self.first.1) % SIDE_LOOKOUT
@@ -70,6 +81,7 @@ pub(super) struct Pass<'a, R> {
     pub view: &'a Projector,
     /// Whether the camera moves.
     moves: bool,
+    known: Option<KnownArea<'a>>,
     grid: Grid,
     pub rays: &'a R,
     trust: Trust,
@@ -82,11 +94,11 @@ type Bits<'a> = (&'a mut [u32], &'a mut [u32]);
 impl<'a, R: CastCentres> Pass<'a, R> {
     pub fn new(
         (old, sources, proven): (&'a BuzzBuffer, &'a Sources, &'a Tiles),
-        (view, moves): (&'a Projector, bool),
+        (view, moves, known): (&'a Projector, bool, Option<KnownArea<'a>>),
         (rays, askers): (&'a R, Option<Askers<'a>>),
         trust: Trust,
     ) -> Self {
-        Self { old, sources, proven, view, moves, grid: Grid::of(view), rays, trust, askers }
+        Self { old, sources, proven, view, moves, known, grid: Grid::of(view), rays, trust, askers }
     }
 
     /// Casts what is wanted at all pixels.
@@ -94,8 +106,9 @@ impl<'a, R: CastCentres> Pass<'a, R> {
         self.by_rows(new, bits, |y, (row, above), bits, counts| {
             let (steps, mut memory) = (Steps::of(y), R::Memory::default());
             let mut changed = self.changed();
+            let known = self.known.map_or(0..self.old.width(), |known| known.columns(y));
             steps.columns(row.object.len(), |x| {
-                if row.object[x] != UNKNOWN && self.wants_proof((x, y), row) {
+                if row.object[x] != UNKNOWN && self.wants_proof((x, y), row, &known) {
                     self.forget_if_hidden(x, row, counts);
                 }
                 if row.object[x] == UNKNOWN {
@@ -178,15 +191,20 @@ impl<'a, R: CastCentres> Pass<'a, R> {
         self.moves && has(NEAR_LOOKOUT) && (has(LOOKOUT) || grows())
     }
 
-    /// True where what is reused is proven visible whatever is known around it.
-    fn wants_proof(&self, (x, y): (usize, usize), row: &Row<'_>) -> bool {
+    /// True where what is reused is proven visible whatever is known around it; `known` are the columns in which nothing has come in.
+    fn wants_proof(&self, (x, y): (usize, usize), row: &Row<'_>, known: &Range<usize>) -> bool {
         let is_at_side = || x == 0 || y == 0 || x + 1 == self.old.width() || y + 1 == self.old.height();
         let comes_in = || self.moves && is_at_side() && self.grid.has_side((x, y));
+        let is_new =
+            || self.grid.has_new((x, y)) && (!known.contains(&x) || self.was_new(y * self.old.width() + x));
         let is_body = || self.askers.as_ref().is_some_and(|askers| askers.is_on_body(&row.sample(x)));
         match self.trust {
             Trust::Proof => !self.proven.has((x, y)),
             Trust::Neighbours => {
-                self.looks_out((x, y), row) || comes_in() || self.grid.has((x, y), BODY_LOOKOUT) && is_body()
+                self.looks_out((x, y), row)
+                    || comes_in()
+                    || is_new()
+                    || self.grid.has((x, y), BODY_LOOKOUT) && is_body()
             }
         }
     }
@@ -195,6 +213,15 @@ impl<'a, R: CastCentres> Pass<'a, R> {
     pub fn is_new(&self, pixel: usize) -> bool {
         let width = self.old.width();
         self.sources.is_nothing_around(width, (pixel % width, pixel / width))
+    }
+
+    /// True if what has landed on a pixel was new in the old view, and no ray was cast for it.
+    fn was_new(&self, pixel: usize) -> bool {
+        let (width, height, class) = (self.old.width(), self.old.height(), &self.old.class);
+        let is_new = |&i: &usize| class[i] == PixelClass::Filled || !class[i].is_reused();
+        self.sources.of(pixel).is_some_and(|i| {
+            class[i] == PixelClass::Filled && pixels_around(width, height, i).all(|around| is_new(&around))
+        })
     }
 
     /// What an unknown pixel shows that has come into view with all around it, where its row says so.

@@ -24,6 +24,7 @@ use super::alike::{Alike, AlikeRow};
 use super::around::{Around, Trust, believes_cells};
 use super::buzz_buffer::{BuzzBuffer, CastRays, Row, UNKNOWN};
 use super::cast::Pass;
+use super::entering::KnownArea;
 use super::frontier::Frontier;
 use super::moved::Askers;
 use super::outlines::Outlines;
@@ -217,11 +218,11 @@ impl Centring {
     }
 
     /// Casts the rays that are still wanted: to see what pixels show, and to the lights that may reach it. `moves` says
-    /// whether the camera does.
-    pub fn cast(
+    /// whether the camera does, `known` where nothing can have come in before what has stayed.
+    pub(super) fn cast(
         &mut self,
         (old, shafts): (&BuzzBuffer, &mut Shafts),
-        (view, moves): (&Projector, bool),
+        (view, moves, known): (&Projector, bool, Option<KnownArea<'_>>),
         rays: &impl CastCentres,
         trust: Trust,
         new: &mut BuzzBuffer,
@@ -232,8 +233,8 @@ impl Centring {
             let at = |x: usize, y: usize| new.sample(y * new.width() + x);
             self.tiles.look(new, |pixels| rays.sees_all(pixels, at));
         }
-        let known = (old, &self.sources, &self.tiles);
-        let pass = Pass::new(known, (view, moves), (rays, askers), trust);
+        let said = (old, &self.sources, &self.tiles);
+        let pass = Pass::new(said, (view, moves, known), (rays, askers), trust);
         let mut counts = pass.cast(new, (&mut self.ask, &mut self.doubt));
         let frontier = &mut self.frontier;
         // Where everything is proven nothing new is met beside it.

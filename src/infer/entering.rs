@@ -15,44 +15,63 @@ use super::project::{AT_CENTRE, Landings};
 use super::projector::Projector;
 use crate::frame::PixelClass;
 use crate::scene::View;
-use glam::{DVec3, DVec4, Vec2};
+use glam::{DMat4, DVec3, Vec2};
 use rayon::prelude::*;
+use std::ops::Range;
 
 /// Camera moves shorter than this share of k count as pure rotations: they shift nothing by a thousandth of a pixel
 /// on an image of a thousand.
 const STILL: f64 = 1e-6;
 
-/// Marks the contested area for new objects that are at planar depth `k` (metres) or farther.
+/// Where the old view saw what is at planar depth k, metres, or farther.
 ///
 /// A pixel is known if the point at depth k on its centre ray lies in the old viewing volume. That point's old raster
 /// position is a homography of the new one, so each row's known pixels are one span; together they are the paper's
-/// scan-converted polygon of at most eight vertices.
-pub fn entering(old: &View, new: &View, k: f64, marks: &Marks) {
-    if (old.eye - new.eye).length() <= STILL * k && old.is_perspective() {
-        return;
+/// scan-converted polygon of at most eight vertices. The others are its contested area.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct KnownArea<'a> {
+    old: &'a View,
+    new: &'a View,
+    old_raster_from_world: DMat4,
+    k: f64,
+}
+
+impl<'a> KnownArea<'a> {
+    /// None where nothing is contested: the camera only turns.
+    pub fn between(old: &'a View, new: &'a View, k: f64) -> Option<Self> {
+        let moves = (old.eye - new.eye).length() > STILL * k || !old.is_perspective();
+        moves.then(|| Self { old, new, old_raster_from_world: old.raster_from_world(DVec3::ZERO), k })
     }
-    let old_raster_from_world = old.raster_from_world(DVec3::ZERO);
-    let old_raster = |x: f64, y: f64| {
-        let ray = new.ray(x, y);
-        old_raster_from_world * (ray.origin + ray.direction * k).extend(1.0)
-    };
-    let (width, height) = (f64::from(old.width), f64::from(old.height));
-    let near = old.lens.near;
-    // Positive inside, affine along a row.
-    let sides = |r: DVec4| [r.x, r.y, width * r.w - r.x, height * r.w - r.y, r.z - near];
-    let columns = new.width as usize;
-    (0..new.height as usize).into_par_iter().for_each(|row| {
-        let y = row as f64 + 0.5;
-        let first = sides(old_raster(0.5, y));
-        let last = sides(old_raster(columns as f64 - 0.5, y));
+
+    /// The known columns of a row.
+    pub fn columns(&self, row: usize) -> Range<usize> {
+        let (width, height) = (f64::from(self.old.width), f64::from(self.old.height));
+        let near = self.old.lens.near;
+        // Positive inside, affine along a row.
+        let sides = |column: f64| {
+            let ray = self.new.ray(column, row as f64 + 0.5);
+            let r = self.old_raster_from_world * (ray.origin + ray.direction * self.k).extend(1.0);
+            [r.x, r.y, width * r.w - r.x, height * r.w - r.y, r.z - near]
+        };
+        let columns = self.new.width as usize;
+        let (first, last) = (sides(0.5), sides(columns as f64 - 0.5));
         let (mut from, mut to) = (0, columns);
         for (a, b) in first.into_iter().zip(last) {
             let (f, t) = positive_span(a, b, columns);
             from = from.max(f);
             to = to.min(t);
         }
-        let to = to.max(from);
-        for x in (0..from).chain(to..columns) {
+        from..to.max(from)
+    }
+}
+
+/// Marks the contested area for new objects that are at planar depth `k` (metres) or farther.
+pub fn entering(old: &View, new: &View, k: f64, marks: &Marks) {
+    let Some(area) = KnownArea::between(old, new, k) else { return };
+    let columns = new.width as usize;
+    (0..new.height as usize).into_par_iter().for_each(|row| {
+        let known = area.columns(row);
+        for x in (0..known.start).chain(known.end..columns) {
             marks.set(row * columns + x, PixelClass::Entering);
         }
     });
@@ -60,9 +79,9 @@ pub fn entering(old: &View, new: &View, k: f64, marks: &Marks) {
 
 /// Marks the pixels at the sides of the image whose centre was not between old ones, or on which nothing landed (past the paper).
 ///
-/// Whatever comes in passes there, if it does so by less than a pixel a frame and no pixel is missed. Where a ray meets it,
-/// it is [followed](super::outlines) from there as far as it goes, however near it is; so there is no contested area. So are the
-/// edges of shadows that come in.
+/// What comes in passes there, or has gone farther in if it is nearer than what is behind it: in the contested area some samples are
+/// [proven](super::cast). Where a ray meets it, it is [followed](super::outlines) from there as far as it goes, however near it
+/// is, so that none of the area need be cleared. So are the edges of shadows that come in.
 pub(super) fn at_sides(old: &BuzzBuffer, view: &Projector, landings: &Landings, marks: &Marks) {
     let (width, height) = (old.width(), old.height());
     let last = Vec2::new(width as f32, height as f32) - 1.0;

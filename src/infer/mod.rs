@@ -72,7 +72,7 @@ pub use voxels::{Line, Voxels};
 use crate::frame::{PixelClass, RayCounts};
 use crate::scene::View;
 use creeping::forget_creeping;
-use entering::at_sides;
+use entering::{KnownArea, at_sides};
 use glam::DVec3;
 use moved::{moved, relight, ride};
 use rayon::prelude::*;
@@ -138,16 +138,14 @@ impl Inference {
     ) -> Cost {
         let to = Projector::new(new_view, origin);
         let mut cost = Cost::default();
-        let nearest = self.reproject(by, old, old_view, new_view, origin, rays);
+        let k = self.reproject(by, old, old_view, new_view, origin, rays);
         let (landings, marks) = (&self.landings, &self.marks);
         // Clear what an old hit could be hiding.
         match by {
             Move::Camera => obscured(old, &Projector::new(old_view, origin), &to, landings, marks),
             Move::OtherEye => in_gaps(old, &Parallax::between(old_view, new_view, origin), landings, marks),
         }
-        // Clear the contested area, where new objects may come in: k is the nearest that is known. Where that is only sky,
-        // anything may, as near as the view begins.
-        let k = nearest.map_or(new_view.lens.near.max(NEAREST), f64::from);
+        // Clear the contested area, where new objects may come in.
         entering(old_view, new_view, k, marks);
         let old = if rides(rays.motion()) { &self.now } else { old };
         gather(old, &self.landings, &self.marks, new);
@@ -177,21 +175,22 @@ impl Inference {
     ) -> Cost {
         let to = Projector::new(new_view, origin);
         let mut cost = Cost::default();
-        self.reproject(by, old, old_view, new_view, origin, rays);
+        let k = self.reproject(by, old, old_view, new_view, origin, rays);
         let old = if rides(rays.motion()) { &self.now } else { old };
         // Clear the sides, where new objects may come in.
         at_sides(old, &to, &self.landings, &self.marks);
 
         // Centre what lies within surfaces. Cast rays at edges, and at what nothing explains; where they meet what was hidden or
-        // has come in, cast as far as it goes. Then along shadows' edges.
+        // has come in, for which some are cast in the contested area too, cast as far as it goes. Then along shadows' edges.
         self.centring.recentre(old, (&self.landings, &self.marks), &to, rays, trust, new);
-        let moves = old_view != new_view;
-        cost.add(|| self.centring.cast((old, &mut self.shafts), (&to, moves), rays, trust, new));
+        let (moves, known) = (old_view != new_view, KnownArea::between(old_view, new_view, k));
+        cost.add(|| self.centring.cast((old, &mut self.shafts), (&to, moves, known), rays, trust, new));
         cost
     }
 
     /// Finds which old sample each new pixel shows, and before which something stands that moved or has opened to the eye.
-    /// Where something has moved, `now` are the old samples after it. Returns the least depth of all.
+    /// Where something has moved, `now` are the old samples after it. Returns k, how near new objects may come in: as near as anything
+    /// that is known; where that is only sky, as near as the view begins.
     fn reproject(
         &mut self,
         by: Move,
@@ -200,7 +199,7 @@ impl Inference {
         new_view: &View,
         origin: DVec3,
         rays: &impl CastRays,
-    ) -> Option<f32> {
+    ) -> f64 {
         let (landings, marks) = (&mut self.landings, &mut self.marks);
         let to = Projector::new(new_view, origin);
 
@@ -232,7 +231,7 @@ impl Inference {
         if let Some(motion) = motion {
             moved(now, &to, motion, landings, marks);
         }
-        nearest
+        nearest.map_or(new_view.lens.near.max(NEAREST), f64::from)
     }
 }
 

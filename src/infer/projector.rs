@@ -48,7 +48,7 @@ impl Projector {
             width: view.width as f32,
             height: view.height as f32,
             columns: view.width as usize,
-            pixel: view.pixel_size() as f32,
+            pixel: view.pixel_extent().max_element() as f32,
         }
     }
 
@@ -87,12 +87,12 @@ impl Projector {
         }
     }
 
-    /// Side of a pixel at planar depth 1, or anywhere in parallel projection, metres.
+    /// The longer side of a pixel at planar depth 1, or anywhere in parallel projection, metres.
     pub(super) fn side(&self) -> f32 {
         self.pixel
     }
 
-    /// Side of a pixel at a point's depth, metres.
+    /// The longer side of a pixel at a point's depth, metres.
     pub fn pixel_width(&self, position: Vec3) -> f32 {
         let depth = if self.perspective { (position - self.eye).dot(self.forward).abs() } else { 1.0 };
         self.pixel * depth

@@ -37,7 +37,7 @@ impl Sources {
         (1 + NAMES + lit_words) * size_of::<u32>()
     }
 
-    /// Settles it for all pixels, once all lines have been walked.
+    /// Settles it for all pixels, once all samples have landed and all marks are set.
     pub fn settle(&mut self, old: &BuzzBuffer, landings: &Landings, marks: &Marks) {
         let (width, height, pixels) = (old.width(), old.height(), landings.len());
         self.landed.resize(pixels, NOTHING);

@@ -36,15 +36,37 @@ impl Stage {
         let mut stage = Self { json, bytes: Vec::new() };
         let floor = [[-5.0, 0.0, 5.0], [5.0, 0.0, 5.0], [5.0, 0.0, -5.0], [-5.0, 0.0, -5.0]];
         let card = [[-0.7, 0.0, 0.0], [0.7, 0.0, 0.0], [0.7, 1.5, 0.0], [-0.7, 1.5, 0.0]];
-        for (material, [a, b, c, d]) in [floor, card].into_iter().enumerate() {
-            let corners: Vec<f32> = [a, b, c, a, c, d].concat();
-            let position = stage.floats("VEC3", &corners);
-            stage.push(
-                "meshes",
-                json!({"primitives": [{"attributes": {"POSITION": position}, "material": material}]}),
-            );
+        for (material, corners) in [floor, card].into_iter().enumerate() {
+            let primitive = stage.sheet(corners, material);
+            stage.push("meshes", json!({"primitives": [primitive]}));
         }
         stage
+    }
+
+    /// A primitive with four corners.
+    fn sheet(&mut self, [a, b, c, d]: [[f32; 3]; 4], material: usize) -> Value {
+        let position = self.floats("VEC3", &[a, b, c, a, c, d].concat());
+        json!({"attributes": {"POSITION": position}, "material": material})
+    }
+
+    /// Puts up one mesh of two materials that need no light: so many bars, a hand's breadth wide, a finger's before a pane.
+    pub fn bars_before_a_pane(&mut self, count: usize) {
+        self.json["extensionsUsed"].as_array_mut().unwrap().push("KHR_materials_unlit".into());
+        let [bar, pane] = [[1, 0, 0, 1], [0, 0, 1, 1]].map(|color| {
+            let unlit = json!({"doubleSided": true, "pbrMetallicRoughness": {"baseColorFactor": color}, "extensions": {"KHR_materials_unlit": {}}});
+            self.push("materials", unlit)
+        });
+        let upright = |left: f32, right: f32, z: f32| {
+            [[left, 0.0, z], [right, 0.0, z], [right, 2.0, z], [left, 2.0, z]]
+        };
+        let mut primitives = vec![self.sheet(upright(-2.0, 2.0, 0.0), pane)];
+        for i in 0..count {
+            let left = -1.75 + 3.5 * i as f32 / (count - 1) as f32;
+            primitives.push(self.sheet(upright(left, left + 0.16, 0.01), bar));
+        }
+        let mesh = self.push("meshes", json!({"primitives": primitives}));
+        let node = self.push("nodes", json!({"mesh": mesh, "translation": [0, 0, 0.5]}));
+        self.json["scenes"][0]["nodes"].as_array_mut().unwrap().push(json!(node));
     }
 
     /// The camera drifts to the right for `frames` frames.

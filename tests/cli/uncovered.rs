@@ -1,5 +1,5 @@
-//! What comes out of nothing: a one-sided sheet whose plane the eye crosses, what the near and far planes no longer cut off, and what was
-//! too small to be sampled.
+//! What comes out of nothing: a one-sided sheet whose plane the eye crosses, what the near and far planes no longer cut off, what was
+//! too small to be sampled, and what comes in at the sides before what is far behind it.
 
 use crate::rig::{buzz, channels, frames_in, fresh, run};
 use crate::stage::{CAMERA, CARD, LAMP, Stage};
@@ -119,5 +119,54 @@ fn a_pool_of_light_that_was_too_small_to_be_sampled_is_found_as_it_grows() {
         let (shown, truth) = (lit(&out), lit(&full));
         // As large as the places at which light is looked for are far apart it may be missed.
         assert!(truth < 100.0 || shown > 0.9 * truth, "{frame}: {shown} of {truth} pixels are lit");
+    }
+}
+
+#[test]
+fn what_is_near_is_seen_when_it_comes_in_though_it_is_small() {
+    let (folder, out) = fresh();
+    let full = folder.path().join("full");
+    let mut stage = Stage::new();
+    // They move by ten pixels a frame, all that is behind them by two, and five pixels wide they pass the outermost ones between
+    // two frames.
+    for i in 0..8 {
+        let node = stage.json["nodes"].as_array().unwrap().len();
+        let place = json!([0.82 + 0.1 * f64::from(i), 0.75 + 0.07 * f64::from(i * 3 % 8), 4.8]);
+        let card = json!({"mesh": 1, "scale": [0.03, 0.03, 0.03], "translation": place});
+        stage.json["nodes"].as_array_mut().unwrap().push(card);
+        stage.json["scenes"][0]["nodes"].as_array_mut().unwrap().push(json!(node));
+    }
+    let path: Vec<[f32; 3]> = (0..12).map(|i| [0.08 * i as f32, 1.0, 6.0]).collect();
+    stage.translate(CAMERA, &path);
+    let scene = stage.write(&folder.path().join("s.gltf"));
+    let plan = all_from_the_first(&scene, path.len());
+    run(&scene, &full, "-r 192x108 --aov object -q full").ok();
+    run(&scene, &out, &format!("-r 192x108 --aov object --plan {}", plan.display())).ok();
+    for frame in frames_in(&out) {
+        let objects = |folder: &Path| channels(&folder.join(&frame))["objectId.id"].clone();
+        let wrong = objects(&out).iter().zip(&objects(&full)).filter(|(a, b)| a != b).count();
+        // Each covers thirty.
+        assert!(wrong <= 5, "{frame}: {wrong}");
+    }
+}
+
+#[test]
+fn the_parts_of_one_object_have_outlines() {
+    let (folder, out) = fresh();
+    let full = folder.path().join("full");
+    let mut stage = Stage::new();
+    stage.bars_before_a_pane(8);
+    let path: Vec<[f32; 3]> = (0..12).map(|i| [0.03 * i as f32, 1.0, 6.0]).collect();
+    stage.translate(CAMERA, &path);
+    let scene = stage.write(&folder.path().join("s.gltf"));
+    let plan = all_from_the_first(&scene, path.len());
+    run(&scene, &full, "-r 192x108 -q full").ok();
+    run(&scene, &out, &format!("-r 192x108 --plan {}", plan.display())).ok();
+    for frame in frames_in(&out) {
+        let [shown, truth] = [&out, &full].map(|folder| channels(&folder.join(&frame)));
+        let differs = |i: &usize| ["R", "B"].iter().any(|c| (shown[*c][*i] - truth[*c][*i]).abs() > 0.3);
+        let wrong = (0..truth["R"].len()).filter(differs).count();
+        // When the parts of an object were taken for one surface, up to 67 were.
+        assert!(wrong <= 4, "{frame}: {wrong}");
     }
 }
