@@ -82,64 +82,99 @@ impl Chain {
     }
 }
 
-/// The least costs of dividing a sequence's first 0, 1, 2, ... frames into segments, each with its last segment.
+/// How a sequence's first 0, 1, 2, ... frames are best divided into segments and these into shares that cost no more than a budget:
+/// in as few shares as possible, the last of which costs as little as possible.
 ///
-/// Dynamic programming: `cost[j]` is the least cost of the first j frames; a key frame k opens a segment that begins at
-/// or before it, at the least cost of all beginnings, and closes it at each of the ends that its samples reach.
+/// Dynamic programming: a key frame opens a segment that begins at or before it, at the least cost of all beginnings, and
+/// closes it at each of the ends that its samples reach. Fewer shares are always better, whatever the last of them has cost: one more
+/// can be begun anywhere.
 struct Division {
-    cost: Vec<f64>,
-    last: Vec<Range>,
+    best: Vec<Option<Best>>,
+}
+
+/// The best way to divide so many frames.
+#[derive(Debug, Clone, Copy)]
+struct Best {
+    shares: usize,
+    /// Of the last share.
+    cost: f64,
+    /// The last segment, and whether a share begins with it.
+    last: Range,
+    opens: bool,
+}
+
+/// A way to open a segment.
+struct Opening {
+    shares: usize,
+    /// Of the share until the key frame, which counts.
+    cost: f64,
+    first: usize,
+    opens: bool,
 }
 
 impl Division {
-    /// Goes on until the cost is over `budget`.
     fn of(chains: &[Chain], budget: f64) -> Self {
-        let (mut cost, mut last) = (vec![0.0], vec![Range { key: 0, first: 0, last: 0 }]);
+        let nothing = Best { shares: 1, cost: 0.0, last: Range { key: 0, first: 0, last: 0 }, opens: true };
+        let mut best = vec![Some(nothing)];
+        best.resize(chains.len() + 1, None);
         for (key, chain) in chains.iter().enumerate() {
-            if cost[key] > budget {
-                break;
-            }
-            let (mut open, mut first, mut spent) = (cost[key] + chain.key, key, chain.key);
-            for (back, inferred) in chain.backward.iter().take(key).enumerate() {
-                spent += inferred.cost;
-                let start = key - back - 1;
-                if cost[start] + spent < open {
-                    (open, first) = (cost[start] + spent, start);
-                }
-            }
+            let openings = Self::openings(&best, key, chain, budget);
             let forward = chain.forward.iter().take(chains.len() - key - 1).map(|i| i.cost);
-            let mut total = open;
+            let mut spent = 0.0;
             for (ahead, step) in std::iter::once(0.0).chain(forward).enumerate() {
-                total += step;
-                let end = key + ahead + 1;
-                if end == cost.len() {
-                    cost.push(f64::INFINITY);
-                    last.push(Range { key, first, last: end - 1 });
-                }
-                if total < cost[end] {
-                    cost[end] = total;
-                    last[end] = Range { key, first, last: end - 1 };
+                spent += step;
+                // They come by the number of shares.
+                let Some(open) = openings.iter().find(|open| open.cost + spent <= budget) else { break };
+                let (end, cost) = (key + ahead + 1, open.cost + spent);
+                if best[end].is_none_or(|b| (open.shares, cost) < (b.shares, b.cost)) {
+                    let last = Range { key, first: open.first, last: end - 1 };
+                    best[end] = Some(Best { shares: open.shares, cost, last, opens: open.opens });
                 }
             }
         }
-        Self { cost, last }
+        Self { best }
     }
 
-    /// How many of the first frames `budget` is enough for.
-    fn reach(&self, budget: f64) -> usize {
-        self.cost.iter().rposition(|&cost| cost <= budget).unwrap_or(0)
+    /// The cheapest way to open the segment of a key frame with each number of shares, the fewest first.
+    fn openings(best: &[Option<Best>], key: usize, chain: &Chain, budget: f64) -> Vec<Opening> {
+        let mut found: Vec<Opening> = Vec::new();
+        let mut spent = chain.key;
+        let backward = chain.backward.iter().take(key).map(|i| i.cost);
+        for (back, step) in std::iter::once(0.0).chain(backward).enumerate() {
+            spent += step;
+            let first = key - back;
+            let Some(before) = best[first] else { continue };
+            for (shares, cost, opens) in
+                [(before.shares, before.cost + spent, first == 0), (before.shares + 1, spent, true)]
+            {
+                let opening = Opening { shares, cost, first, opens };
+                match found.iter_mut().find(|o| o.shares == shares) {
+                    Some(known) if cost < known.cost => *known = opening,
+                    None if cost <= budget => found.push(opening),
+                    _ => {}
+                }
+            }
+        }
+        found.sort_by_key(|opening| opening.shares);
+        found
     }
 
-    /// The segments of the first `frames` frames.
-    fn segments(&self, frames: usize) -> Vec<Range> {
+    /// The shares of all frames; none if no share may cost so little.
+    fn shares(&self) -> Option<Vec<Share>> {
+        let mut end = self.best.len() - 1;
         let mut found = Vec::new();
-        let mut end = frames;
+        let mut share = Share { ranges: Vec::new(), cost: self.best[end]?.cost };
         while end > 0 {
-            found.push(self.last[end]);
-            end = self.last[end].first;
+            let best = self.best[end]?;
+            share.ranges.insert(0, best.last);
+            end = best.last.first;
+            if best.opens {
+                let cost = self.best[end]?.cost;
+                found.push(std::mem::replace(&mut share, Share { ranges: Vec::new(), cost }));
+            }
         }
         found.reverse();
-        found
+        Some(found)
     }
 }
 
@@ -159,18 +194,17 @@ const SHARE_PRECISION: f64 = 0.01;
 /// as possible; of one worker's work that is the least in all.
 ///
 /// A share may end within what would be one segment: the next one then pays for a key frame of its own, and both are
-/// done sooner. Given what a share may cost, filling one after the other is best, since fewer frames never cost more;
-/// so the least such cost is found by bisection.
+/// done sooner. What the dearest must cost is found by bisection.
 pub fn divide(chains: &[Chain], workers: usize) -> Vec<Share> {
-    let whole = Division::of(chains, f64::INFINITY);
-    let mut enough = whole.cost[chains.len()];
-    let mut best = vec![Share { ranges: whole.segments(chains.len()), cost: enough }];
+    let dearest = |shares: &[Share]| shares.iter().map(|s| s.cost).fold(0.0, f64::max);
+    let mut best = Division::of(chains, f64::INFINITY).shares().unwrap_or_default();
+    let mut enough = dearest(&best);
     let mut too_little = enough / workers as f64 - SHARE_PRECISION;
     while workers > 1 && enough - too_little > SHARE_PRECISION {
         let budget = 0.5 * (too_little + enough);
-        match fill(chains, workers, budget) {
+        match Division::of(chains, budget).shares().filter(|shares| shares.len() <= workers) {
             Some(shares) => {
-                enough = shares.iter().map(|s| s.cost).fold(0.0, f64::max);
+                enough = dearest(&shares);
                 best = shares;
             }
             None => too_little = budget,
@@ -179,31 +213,22 @@ pub fn divide(chains: &[Chain], workers: usize) -> Vec<Share> {
     best
 }
 
-/// Shares that cost at most `budget` each; `None` if so many workers are not enough.
-fn fill(chains: &[Chain], workers: usize, budget: f64) -> Option<Vec<Share>> {
-    let mut shares = Vec::new();
-    let mut start = 0;
-    while start < chains.len() && shares.len() < workers {
-        let division = Division::of(&chains[start..], budget);
-        let frames = division.reach(budget);
-        let moved = |r: Range| Range { key: r.key + start, first: r.first + start, last: r.last + start };
-        let ranges = division.segments(frames).into_iter().map(moved).collect();
-        shares.push(Share { ranges, cost: division.cost[frames] });
-        start += frames;
-    }
-    (start == chains.len()).then_some(shares)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
 
     /// A camera that moves alike in every step, seeing so much of each frame anew.
     fn steady(frames: usize, new: f64) -> Vec<Chain> {
+        under(&vec![2.0; frames], new)
+    }
+
+    /// The same in light that takes so many shadow rays a pixel in each frame.
+    fn under(shadow_rays: &[f64], new: f64) -> Vec<Chain> {
         let change = Change { outside: new, pixels: 3.0, ..Change::default() };
         let step = Step { forward: change, backward: change };
         let unit = Weights::traced_cost(2.0);
-        Chain::of_shot(&vec![step; frames - 1], &vec![2.0; frames], |_| [32, 32], &Weights::HALF_PIXEL, unit)
+        let steps = vec![step; shadow_rays.len() - 1];
+        Chain::of_shot(&steps, shadow_rays, |_| [32, 32], &Weights::HALF_PIXEL, unit)
     }
 
     fn cost(chains: &[Chain], range: &Range) -> f64 {
@@ -235,25 +260,34 @@ mod tests {
         }
     }
 
+    /// The least that one share of all these frames costs.
+    fn by_one(chains: &[Chain]) -> f64 {
+        Division::of(chains, f64::INFINITY).best[chains.len()].map_or(f64::INFINITY, |best| best.cost)
+    }
+
     /// The least that the dearest share can cost, by trying every end of every share.
     fn by_trial(chains: &[Chain], workers: usize) -> f64 {
-        let whole = Division::of(chains, f64::INFINITY);
+        let whole = by_one(chains);
         if workers == 1 {
-            return whole.cost[chains.len()];
+            return whole;
         }
         let ends = 1..chains.len();
-        ends.map(|end| whole.cost[end].max(by_trial(&chains[end..], workers - 1)))
-            .fold(whole.cost[chains.len()], f64::min)
+        ends.map(|end| by_one(&chains[..end]).max(by_trial(&chains[end..], workers - 1)))
+            .fold(whole, f64::min)
     }
 
     #[test]
     fn no_other_shares_are_done_sooner() {
-        for new in [0.0, 0.05, 0.4] {
-            let chains = steady(24, new);
-            for workers in 1..=3 {
+        // Where key frames cost differently, fewer frames may cost more: the dear ones, without the cheap one beside them.
+        let goes_out = |after: usize| (0..16).map(|i| if i < after { 12.0 } else { 0.0 }).collect::<Vec<_>>();
+        let flickers = (0..16).map(|i| f64::from(i * 7 % 11)).collect();
+        let lights = [vec![2.0; 24], goes_out(2), goes_out(5), goes_out(15), flickers];
+        for (light, new) in lights.iter().flat_map(|light| [0.0, 0.05, 0.4].map(|new| (light, new))) {
+            let chains = under(light, new);
+            for workers in 1..=4 {
                 let dearest = divide(&chains, workers).iter().map(|s| s.cost).fold(0.0, f64::max);
                 let best = by_trial(&chains, workers);
-                assert!(dearest <= best + SHARE_PRECISION, "{workers} workers: {dearest} {best}");
+                assert!(dearest <= best + SHARE_PRECISION, "{workers} workers: {dearest} {best}, {light:?}");
             }
         }
     }
