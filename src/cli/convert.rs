@@ -14,7 +14,6 @@ use super::{memory, parse};
 use anyhow::{Context, Result};
 use buzz::error::Error;
 use buzz::frame::{Aov, FrameId, FrameKind, FrameStats, StereoEye};
-use buzz::infer::SubPixels;
 use buzz::output::{
     Compression, ExrSink, FileOptions, FrameRecord, NamePattern, OutputFolder, Review, Run, RunSeconds,
     SettingsHash, SettingsHasher, Thumbnails, WithThumbnails, earlier_runs, peak_bytes,
@@ -99,7 +98,7 @@ pub fn run(args: ConvertArgs) -> Result<ExitCode> {
     let to_render: BTreeSet<i64> =
         frames.difference(&skipped.iter().map(|r| r.id.number).collect()).copied().collect();
     if !to_render.is_empty() {
-        memory::refuse_over(memory_limit, &job)?;
+        memory::refuse_over(memory_limit, &job, 0)?;
     }
 
     let options = FileOptions {
@@ -206,24 +205,11 @@ fn choose_image(job: &mut Job, args: &ConvertArgs) -> Result<()> {
     settings.light_samples = args.output.light_samples;
     settings.ambient_samples = args.output.ambient_samples;
     settings.audit = args.output.audit;
-    refuse_uncountable(settings)?;
+    memory::refuse_uncountable(settings)?;
     if settings.stereo.is_some() {
         refuse_parallel(&job.scene, settings)?;
     }
     Ok(())
-}
-
-/// Samples are numbered, old pixels in 30 bits and with sub-pixels in 31.
-fn refuse_uncountable(settings: &Settings) -> Result<()> {
-    let pixels = settings.window.pixels();
-    let samples = pixels.saturating_mul(1 + SubPixels::most_per_pixel(settings.aa));
-    if pixels < (1 << 30) - 1 && samples < 1 << 31 {
-        return Ok(());
-    }
-    let message = format!(
-        "--resolution, --aa: {pixels} pixels have {samples} samples; fewer than 2^30 pixels and 2^31 samples are rendered at once, larger images in parts (--crop)"
-    );
-    Err(Error::Usage(message).into())
 }
 
 /// Parallel rays show both eyes the same.

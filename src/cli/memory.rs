@@ -3,7 +3,7 @@
 use super::job::Job;
 use anyhow::Result;
 use buzz::error::Error;
-use buzz::infer::Inference;
+use buzz::infer::{Inference, SubPixels};
 use buzz::output::{ExrSink, most_bytes, peak_bytes};
 use buzz::plan::{PathFrame, ProbePoint};
 use buzz::scene::{Requirements, Scene};
@@ -21,14 +21,15 @@ const BYTES_PER_THREAD: u64 = 2 << 20;
 
 /// An error if rendering is estimated to take more than `allowed` bytes, or where nothing is said more than the machine has.
 /// To be asked once the scene is read and planned.
-pub fn refuse_over(allowed: Option<u64>, job: &Job) -> Result<()> {
+/// What is held besides, for the run, are so many bytes.
+pub fn refuse_over(allowed: Option<u64>, job: &Job, besides: u64) -> Result<()> {
     let held = peak_bytes();
     if allowed.is_some() && held == 0 {
         let message = "--memory: this system does not say how much memory a process holds; leave it out";
         return Err(Error::Usage(message.into()).into());
     }
     let Some(limit) = allowed.or_else(most_bytes) else { return Ok(()) };
-    let estimate = held + rendering(job);
+    let estimate = held + rendering(job) + besides;
     if estimate <= limit {
         return Ok(());
     }
@@ -42,6 +43,19 @@ pub fn refuse_over(allowed: Option<u64>, job: &Job) -> Result<()> {
         "--memory: rendering is estimated to take {} MiB ({} MiB of them for the scene), over the {limit} {whose}; {more} lower --resolution, --aa, --aov or --threads",
         mebibytes(estimate),
         mebibytes(held)
+    );
+    Err(Error::Usage(message).into())
+}
+
+/// An error if there are too many samples: they are numbered, old pixels in 30 bits and with sub-pixels in 31.
+pub fn refuse_uncountable(settings: &Settings) -> Result<()> {
+    let pixels = settings.window.pixels();
+    let samples = pixels.saturating_mul(1 + SubPixels::most_per_pixel(settings.aa));
+    if pixels < (1 << 30) - 1 && samples < 1 << 31 {
+        return Ok(());
+    }
+    let message = format!(
+        "--resolution, --aa: {pixels} pixels have {samples} samples; fewer than 2^30 pixels and 2^31 samples are rendered at once, larger images in parts (--crop)"
     );
     Err(Error::Usage(message).into())
 }

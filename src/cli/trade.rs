@@ -7,7 +7,7 @@ use super::job::{Job, warn_of_ignored};
 use super::{memory, parse, say};
 use anyhow::{Context, Result};
 use buzz::error::Error;
-use buzz::measure::trade::{Candidate, Trade, Watch, sample, trade};
+use buzz::measure::trade::{Candidate, TRUTH_BYTES_PER_PIXEL, Trade, Watch, sample, trade};
 use buzz::output::write_alone;
 use buzz::sequence::Quality;
 use clap::ValueEnum;
@@ -24,6 +24,7 @@ pub fn run(args: TradeArgs) -> Result<ExitCode> {
     let wanted = args.frames.as_deref().map(parse::frames).transpose()?;
     let mut job = Job::new(&args.input, &args.scene, &args.render, QualityArg::Full, None)?;
     warn_of_ignored(&job.scene);
+    memory::refuse_uncountable(&job.settings)?;
     prepare_report(&args.out_dir.join("trade.json"))?;
     memory::refuse_planning_over(None, &job)?;
     let mut candidates = Vec::new();
@@ -41,6 +42,8 @@ pub fn run(args: TradeArgs) -> Result<ExitCode> {
         let frames = args.frames.unwrap_or_default();
         return Err(Error::Usage(format!("--frames {frames}: the scene has frames {first}-{last}")).into());
     }
+    let frames: u64 = spans.iter().map(|span| (span.last - span.first + 1) as u64).sum();
+    memory::refuse_over(None, &job, frames * job.settings.window.pixels() as u64 * TRUTH_BYTES_PER_PIXEL)?;
     interrupt.writing();
     let mut watch = Shown { style: args.progress, interrupt };
     let input = args.input.display().to_string();

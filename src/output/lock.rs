@@ -110,13 +110,19 @@ impl Register {
             return Err(Error::output(path, "is no file, and in the way of locking the folder; remove it"));
         }
         loop {
+            let existed = path.exists();
             let file = OpenOptions::new().write(true).create(true).truncate(false).open(&path);
             let file = file.map_err(|e| explain(&path, &e))?;
             match file.try_lock() {
                 // Whoever held it before has removed it: ours must be the file that is there now.
                 Ok(()) if is_at(&file, &path) => return Ok(Some(Self { _file: file, path })),
                 Ok(()) => {}
-                Err(TryLockError::Error(_)) => return Ok(None),
+                Err(TryLockError::Error(_)) => {
+                    if !existed {
+                        let _ = fs::remove_file(&path);
+                    }
+                    return Ok(None);
+                }
                 Err(TryLockError::WouldBlock) => {
                     if start.elapsed() > PATIENCE {
                         let message = "another run has held it for 10 seconds: end that run, then try again";

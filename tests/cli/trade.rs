@@ -134,3 +134,12 @@ fn differences_are_drawn_on_request() {
     let picture = image::open(pictures.join("s.0002.png")).unwrap().into_rgb8();
     assert_eq!(picture.dimensions(), (3 * 32 + 4 * 4, 18 + 2 * 4));
 }
+
+#[test]
+fn more_samples_than_can_be_numbered_are_refused() {
+    let (folder, out) = fresh();
+    let scene = Stage::drifting(2).write(&folder.path().join("s.gltf"));
+    let (scene, folder) = (scene.to_string_lossy(), out.to_string_lossy());
+    trade(&[&scene, &folder, "-r", "65536x60000"]).refused(2, &["--resolution, --aa", "2^30 pixels"]);
+    assert!(!out.exists());
+}

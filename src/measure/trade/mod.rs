@@ -9,7 +9,7 @@ mod sample;
 mod summary;
 mod text;
 
-pub use run::{ROUNDS, Watch, trade};
+pub use run::{ROUNDS, TRUTH_BYTES_PER_PIXEL, Watch, trade};
 pub use sample::{SAMPLED_FRAMES, sample};
 pub use summary::{ChainStep, Spread, Summary};
 pub(crate) use text::{TITLES, notes, row};

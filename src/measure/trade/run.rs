@@ -32,7 +32,7 @@ pub trait Watch: Sync {
 /// Measures `candidates` on the frames of `spans`, against the first of them.
 ///
 /// Pictures are compared at half precision, as files hold them, so that the errors are those of [`super::super::compare()`] on
-/// the files of separate runs. All sampled frames of the truth are kept in memory, 8 bytes a pixel.
+/// the files of separate runs. All sampled frames of the truth are kept in memory, [`TRUTH_BYTES_PER_PIXEL`].
 ///
 /// # Errors
 /// [`Error::Usage`] without frames or candidates; [`Error::Interrupted`] if `watch` asks to stop.
@@ -222,6 +222,9 @@ struct Truth {
     frames: BTreeMap<i64, Vec<[f16; 4]>>,
     percentile: Percentile,
 }
+
+/// What is kept of each pixel of the truth's sampled frames.
+pub const TRUTH_BYTES_PER_PIXEL: u64 = size_of::<[f16; 4]>() as u64;
 
 impl Truth {
     fn exposure(&self) -> Exposure {

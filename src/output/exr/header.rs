@@ -16,11 +16,11 @@ use glam::{DMat4, DVec3, DVec4};
 
 /// Name of the attribute that identifies a run's settings.
 pub(crate) const SETTINGS_HASH: &str = "buzz/settingsHash";
-/// Name of the attribute that says `traced` or `inferred`.
 /// The frame's number (OpenEXR's standard attribute).
 pub(crate) const FRAME: &str = "imageCounter";
 /// Whose eye's it is, in stereo (OpenEXR's standard attribute).
 pub(crate) const VIEW: &str = "view";
+/// Name of the attribute that says `traced` or `inferred`.
 pub(crate) const FRAME_KIND: &str = "buzz/frameKind";
 /// Name of the attribute with the neighbour from which a frame was inferred.
 pub(crate) const INFERRED_FROM: &str = "buzz/inferredFrom";

@@ -116,7 +116,7 @@ pub struct SceneSummary {
     pub requires: Vec<String>,
     /// What is left out.
     pub ignored: Vec<IgnoredFeature>,
-    /// Bytes that inference keeps for each pixel.
+    /// Bytes that a Buzzbuffer keeps for each pixel.
     pub bytes_per_pixel: usize,
 }
 
