@@ -262,7 +262,7 @@ impl Accel {
         self.origin
     }
 
-    /// A point on a surface, deformed meshes considered, relative to the origin. For the background: zero.
+    /// A point on a surface, deformed meshes considered, metres relative to the [origin](Self::origin). For the background: zero.
     pub fn surface_point(&self, scene: &Scene, surface: SurfaceRef) -> Vec3 {
         let Some(instance) = scene.instances.get(surface.instance as usize) else { return Vec3::ZERO };
         let index = surface.instance as usize;
@@ -283,7 +283,8 @@ impl Accel {
         Some((self.placements[index].normals * shape.point(surface).1).normalize_or(Vec3::Y))
     }
 
-    /// The box around everything that has an end, relative to the origin; nothing where nothing such is placed.
+    /// The lowest and the highest corner of the box around everything that has an end, metres relative to the [origin](Self::origin);
+    /// nothing where nothing such is placed.
     pub fn bounds(&self) -> Option<(Vec3, Vec3)> {
         (!self.bounds.is_empty()).then_some((self.bounds.min, self.bounds.max))
     }

@@ -75,6 +75,8 @@ pub(super) fn apply(scene: &mut Scene, frames: u32) -> Result<()> {
     };
     scene.cameras = vec![Camera { name: "turntable".into(), node, lens, elsewhere: false }];
     scene.cuts.clear();
+    // What exporters say of a missing camera no longer holds.
+    scene.ignored.retain(|ignored| !ignored.feature.starts_with("no camera of "));
     if scene.is_dark() {
         light_up(scene);
     }

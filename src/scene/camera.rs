@@ -176,9 +176,15 @@ impl View {
         matches!(self.lens.projection, Projection::Perspective { .. })
     }
 
-    /// Size of a pixel's side on the plane at depth 1 (perspective) or anywhere (orthographic), metres.
+    /// Width and height of a pixel on the plane at depth 1 (perspective) or anywhere (orthographic), metres.
+    pub fn pixel_extent(&self) -> DVec2 {
+        2.0 * self.half_extent() / DVec2::new(f64::from(self.width), f64::from(self.height))
+    }
+
+    /// Side of a square as large as a pixel there.
     pub fn pixel_size(&self) -> f64 {
-        2.0 * self.half_extent().y / f64::from(self.height)
+        let DVec2 { x, y } = self.pixel_extent();
+        y * (x / y).sqrt()
     }
 
     /// The ray through raster position (x, y).

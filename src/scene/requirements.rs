@@ -26,7 +26,7 @@ pub struct Requirements {
     pub ambient_light: bool,
     /// Lights move or change.
     pub changing_lights: bool,
-    /// The lens changes.
+    /// The lens changes: what it frames, or its near or far plane.
     pub lens_change: bool,
 }
 
@@ -65,6 +65,8 @@ impl Requirements {
                 Target::CameraYfov(_)
                 | Target::CameraXmag(_)
                 | Target::CameraYmag(_)
+                | Target::CameraNear(_)
+                | Target::CameraFar(_)
                 | Target::CameraShift(_) => needs.lens_change = true,
                 _ => {}
             }
@@ -85,11 +87,12 @@ impl Requirements {
             (self.lights, "shadow"),
             (self.moving_objects, "ride"),
             (true, "project"),
-            (true, "obscured"),
             (true, "turned"),
-            (true, "entering"),
+            (true, "uncut"),
             (self.moving_objects, "moved"),
+            (true, "entering"),
             (true, "centre"),
+            (true, "outlines"),
             (self.motion() && self.lights, "relight"),
             (self.lights, "shadow-edges"),
             (self.textures, "texture"),
