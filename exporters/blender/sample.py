@@ -161,7 +161,8 @@ class Sampler:
             if ob.type not in _NOT_MESHES:
                 yield key, instance, visible
             elif visible and _is_something(ob):
-                self.lost.add(ob.name, _NOT_MESHES[ob.type], "it is left out; convert it to a mesh first (Object > Convert)")
+                way = "Volume to Mesh modifier" if ob.type == "VOLUME" else "Object > Convert"
+                self.lost.add(ob.name, _NOT_MESHES[ob.type], f"it is left out; convert it to a mesh first ({way})")
 
     def _is_member(self, parent: bpy.types.Object, ob: bpy.types.Object) -> bool:
         """Whether a collection instancer renders an object of its collection (nested hidden collections do not)."""

@@ -307,3 +307,12 @@ def test_stage_without_lights_is_lit_from_the_camera(usd_convert):
     assert gltf.lost_features("stage.usda") == ["no lights"]
     dark = usd_convert(made, camera_light=False)
     assert "KHR_lights_punctual" not in dark.root.get("extensions", {})
+
+
+def test_stage_without_camera_is_left_to_the_turntable(usd_convert):
+    made = u.stage()
+    UsdGeom.Cube.Define(made, "/Cube")
+    gltf = usd_convert(made)
+    # A light that stood still would leave most of an orbit black; `--turntable` lights what nothing else does.
+    assert "KHR_lights_punctual" not in gltf.root.get("extensions", {})
+    assert gltf.lost_features("stage.usda") == ["no camera"]

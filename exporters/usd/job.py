@@ -27,8 +27,6 @@ from .walk import Found, Walker
 
 _DEFAULT_WIDTH = 1280
 _LONGEST = 100_000
-# Where the light comes from in a stage without a camera: above and behind the one who looks along -Z.
-_DOWNWARDS = np.array([[[0.8, -0.35, 0.49, 0], [0, 0.81, 0.58, 0], [-0.6, -0.47, 0.65, 0], [0, 0, 0, 1]]])
 
 
 @dataclass
@@ -201,7 +199,7 @@ class _Conversion:
                 self.lost.add(path, "dome light that changes", "it stays as it is where it is first seen; animate other lights instead")
             world = write_dome(dome.prim, *dome.seen, self.up, self.output, self.lost)
         cuts = self._cuts()
-        if world is None and not self.lights and self.options.camera_light:
+        if world is None and not self.lights and cuts and self.options.camera_light:
             self._camera_light(document, animation, cuts)
         animation.close()
         self.said.into(self.lost, self.source.name, "USD", "something may be missing from the picture; check the stage with usdchecker")
@@ -299,14 +297,14 @@ class _Conversion:
         return [{"frame": self.frames[0], "camera": wanted, "node": tracks[wanted].node}]
 
     def _camera_light(self, document: Document, animation: motion.Animation, cuts: list[dict[str, Any]]) -> None:
-        """A stage without lights is lit from the camera, as usdview and usdrecord do: white that faces it comes out as 1."""
+        """A stage without lights is lit from its camera, as usdview and usdrecord do: white that faces it comes out as 1."""
         document.use_extension("KHR_lights_punctual")
         light = {"type": "directional", "name": "camera light", "intensity": extras.LUMENS_PER_WATT * math.pi}
         document.root.setdefault("extensions", {})["KHR_lights_punctual"] = {"lights": [light]}
         node: dict[str, Any] = {"name": "camera light", "extensions": {"KHR_lights_punctual": {"light": 0}}}
         index = document.append("nodes", node)
-        track = next((t for t in self.cameras.values() if cuts and t.node == cuts[0]["node"]), None)
-        animation.node(node, index, np.array(track.poses) if track else _DOWNWARDS)
+        track = next(t for t in self.cameras.values() if t.node == cuts[0]["node"])
+        animation.node(node, index, np.array(track.poses))
         self.lost.add(self.source.name, "no lights", "it is lit from the camera as usdview does; add lights, or pass --no-camera-light")
 
     def _finish(self, document: Document, world: dict[str, Any] | None, cuts: list[dict[str, Any]]) -> None:
