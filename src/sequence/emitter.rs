@@ -151,7 +151,6 @@ impl Emitter<'_> {
                 eye: tracer.eye(&shot.view),
                 observer: &*self.observer,
                 origin: self.origin,
-                shot,
                 next: self.neighbour(accel, shot, number + 1, self.cuts.contains(&(number + 1))),
                 previous: self.neighbour(accel, shot, number - 1, self.cuts.contains(&number)),
                 known: is_trusted.then_some(&known),
@@ -179,7 +178,8 @@ impl Emitter<'_> {
         let other = (wanted && inside).then(|| Shot::of_eye(shot.eye, self.scene, self.settings, number));
         other.filter(|o| o.camera == shot.camera).map(|o| {
             let moved = !self.scene.surfaces_alike(&shot.pose, &o.pose);
-            Neighbour { view: o.view, surfaces: moved.then(|| accel.displaced(self.scene, &o.pose)) }
+            let raster = [&shot.view, &o.view].map(|view| view.raster_from_world(self.origin));
+            Neighbour { raster, surfaces: moved.then(|| accel.displaced(self.scene, &o.pose)) }
         })
     }
 }

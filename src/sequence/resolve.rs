@@ -1,13 +1,13 @@
 //! From samples to a frame's layers: the paper's enhancement of every pixel, traced or reused alike.
 
 use super::antialias::Antialias;
-use super::{Observer, Settings, Shot};
+use super::{Observer, Settings};
 use crate::accel::Displaced;
 use crate::frame::{Aov, Frame, FrameKind, FrameStats, Matte, RayCounts, SurfaceSample, Window};
 use crate::infer::BuzzBuffer;
 use crate::scene::{Scene, View};
 use crate::trace::{Eye, KnownLight, Radiance, SHADED_AT_ONCE, Shader, Tracer};
-use glam::{DVec3, DVec4, Vec3, Vec4};
+use glam::{DMat4, DVec3, Vec3, Vec4};
 use rayon::iter::Either;
 use rayon::prelude::*;
 use std::sync::Arc;
@@ -21,11 +21,10 @@ pub(super) struct Resolver<'a> {
     pub tracer: &'a Tracer<'a>,
     /// Of the shot's view.
     pub eye: Eye,
-    /// Asked at each row whether to go on.
+    /// Asked after every few pixels whether to go on.
     pub observer: &'a dyn Observer,
     /// Sample positions are relative to this.
     pub origin: DVec3,
-    pub shot: &'a Shot,
     /// The frame after, where motion is asked for and there is one.
     pub next: Option<Neighbour>,
     /// The frame before.
@@ -94,24 +93,26 @@ impl<'a> Resolver<'a> {
             _ => self.shade_subpixels(buffer, antialias, frame),
         };
 
-        fill(&mut frame.depth, size(Aov::Depth), |i| finite_depth(buffer.z[i]));
-        fill(&mut frame.class, size(Aov::Class), |i| buffer.class[i] as u8);
-        fill(&mut frame.object, size(Aov::Object), |i| buffer.object[i]);
-        fill(&mut frame.normal, size(Aov::Normal), |i| {
+        self.fill(&mut frame.depth, size(Aov::Depth), |i| finite_depth(buffer.z[i]));
+        self.fill(&mut frame.class, size(Aov::Class), |i| buffer.class[i] as u8);
+        self.fill(&mut frame.object, size(Aov::Object), |i| buffer.object[i]);
+        self.fill(&mut frame.normal, size(Aov::Normal), |i| {
             self.on_surface(buffer, i, |s| self.tracer.shading_normal(&self.eye, s))
         });
-        fill(&mut frame.position, size(Aov::Position), |i| {
+        self.fill(&mut frame.position, size(Aov::Position), |i| {
             self.on_surface(buffer, i, |s| (s.position.as_dvec3() + self.origin).as_vec3())
         });
-        fill(&mut frame.forward, size(Aov::Motion), |i| self.motion(&buffer.sample(i), self.next.as_ref()));
-        fill(&mut frame.backward, size(Aov::Motion), |i| {
+        self.fill(&mut frame.forward, size(Aov::Motion), |i| {
+            self.motion(&buffer.sample(i), self.next.as_ref())
+        });
+        self.fill(&mut frame.backward, size(Aov::Motion), |i| {
             self.motion(&buffer.sample(i), self.previous.as_ref())
         });
         let lights = if wants(Aov::Lights) { self.scene.lights.len() } else { 0 };
         frame.lights.resize_with(lights, Default::default);
         for (number, (name, layer)) in frame.lights.iter_mut().enumerate() {
             name.clone_from(&self.scene.lights[number].name);
-            fill(layer, pixels, |i| match self.settings.aa {
+            self.fill(layer, pixels, |i| match self.settings.aa {
                 ..2 => self.on_surface(buffer, i, |s| {
                     self.tracer.light_diffuse(&self.eye, s, buffer.lit(i), number) * self.gain
                 }),
@@ -122,13 +123,29 @@ impl<'a> Resolver<'a> {
         counts
     }
 
+    /// Computes a layer of `size` pixels in parallel.
+    fn fill<T: Send + Clone + Default>(
+        &self,
+        layer: &mut Vec<T>,
+        size: usize,
+        value: impl Fn(usize) -> T + Sync,
+    ) {
+        layer.resize(size, T::default());
+        layer.par_chunks_mut(FILLED_AT_ONCE).enumerate().for_each(|(chunk, texels)| {
+            if self.observer.stop_requested().is_none() {
+                let first = chunk * FILLED_AT_ONCE;
+                texels.iter_mut().zip(first..).for_each(|(texel, i)| *texel = value(i));
+            }
+        });
+    }
+
     fn fill_mattes(&self, buffer: &BuzzBuffer, mattes: &mut Vec<Matte>) {
         mattes.clear();
         let Some(names) = self.names else { return };
         let pixels = self.settings.window.pixels();
         let mut add = |layer, names: &Arc<[String]>, number: &(dyn Fn(&SurfaceSample) -> u32 + Sync)| {
             let mut index = Vec::new();
-            fill(&mut index, pixels, |i| {
+            self.fill(&mut index, pixels, |i| {
                 let sample = buffer.sample(i);
                 if sample.surface.is_background() { 0 } else { number(&sample) }
             });
@@ -241,8 +258,7 @@ impl<'a> Resolver<'a> {
                 other.surfaces.as_ref().map_or(sample.position, |s| s.point(self.scene, sample.surface));
             (here.extend(1.0), there.as_dvec3().extend(1.0))
         };
-        let raster = |view: &View, p: DVec4| view.raster_from_world(self.origin) * p;
-        let (a, b) = (raster(&self.shot.view, here), raster(&other.view, there));
+        let (a, b) = (other.raster[0] * here, other.raster[1] * there);
         // What has come behind the other eye has left the image on its way: it moves towards where it passed the eye.
         let near = NEAREST * a.w;
         let b = if b.w < near && a.w > b.w { a.lerp(b, (a.w - near) / (a.w - b.w)) } else { b };
@@ -259,7 +275,8 @@ const NEAREST: f64 = 1e-3;
 
 /// The frame before or after, as motion needs it.
 pub(super) struct Neighbour {
-    pub view: View,
+    /// `raster_from_world` of the shot itself and of that frame, for positions relative to the resolver's origin.
+    pub raster: [DMat4; 2],
     /// Where surfaces are then; none where nothing but the camera moves.
     pub surfaces: Option<Displaced>,
 }
@@ -298,11 +315,8 @@ fn rows_or_none<T: Send + Sync>(
     }
 }
 
-/// Computes a layer of `size` pixels in parallel.
-fn fill<T: Send + Clone + Default>(layer: &mut Vec<T>, size: usize, value: impl Fn(usize) -> T + Sync) {
-    layer.resize(size, T::default());
-    layer.par_iter_mut().with_min_len(1 << 12).enumerate().for_each(|(i, texel)| *texel = value(i));
-}
+/// So many pixels of a layer are filled between two looks at whether to go on.
+const FILLED_AT_ONCE: usize = 1 << 12;
 
 fn finite_depth(z: f32) -> f32 {
     z.min(Frame::FAR_DEPTH)
