@@ -1,7 +1,7 @@
 //! What a camera move does to the image, measured on a coarse probe of the scene.
 
 use crate::scene::View;
-use glam::{DVec2, DVec3};
+use glam::{DVec2, DVec3, Vec3};
 
 /// One frame of the path that is planned.
 #[derive(Debug, Clone)]
@@ -12,8 +12,6 @@ pub struct PathFrame {
     pub view: View,
     /// What a coarse grid of rays sees, rows from the top; see [`PathFrame::PROBE`].
     pub probe: Vec<ProbePoint>,
-    /// Share of what the probe sees that is not where it was in the frame before.
-    pub moved: f64,
     /// Rays to lights and to the world that a pixel takes when it is traced, mean over the probe.
     pub shadow_rays: f64,
 }
@@ -34,15 +32,17 @@ impl PathFrame {
 /// What one pixel of the probe sees.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ProbePoint {
-    /// World position, or a unit direction for the background.
+    /// World position, metres, or a unit direction for the background.
     pub position: DVec3,
-    /// Planar depth; infinite for the background.
+    /// Planar depth, metres; infinite for the background.
     pub z: f64,
     /// World positions of what is seen a pixel to the right and a pixel below, as for `position`.
     pub beside: [DVec3; 2],
     /// True if another surface is seen within a pixel of it.
     pub is_edge: bool,
-    /// True if something hides it from the eye of the frame before; of the frame after.
+    /// From there to where its surface has it in the frame before, and in the frame after, metres.
+    pub shifts: [Vec3; 2],
+    /// True if something hides it from the eye of the frame before, or it is not there then; of the frame after.
     pub hidden: [bool; 2],
 }
 
@@ -68,7 +68,7 @@ pub struct Change {
     pub stretched: f64,
     /// Share that the neighbour saw, that moves, and that lies at an edge of a surface.
     pub edges: f64,
-    /// Share that is not where it was in the other frame.
+    /// Share of what the neighbour saw whose surface moves in the world, and on the image.
     pub moved: f64,
     /// Mean distance in pixels that what both see moves on the image.
     pub pixels: f64,
@@ -84,10 +84,7 @@ impl Change {
 /// Measures each step of a path; one fewer than frames.
 pub fn steps(path: &[PathFrame]) -> Vec<Step> {
     path.windows(2)
-        .map(|pair| Step {
-            forward: Change { moved: pair[1].moved, ..change(&pair[1], &pair[0], 0) },
-            backward: Change { moved: pair[1].moved, ..change(&pair[0], &pair[1], 1) },
-        })
+        .map(|pair| Step { forward: change(&pair[1], &pair[0], 0), backward: change(&pair[0], &pair[1], 1) })
         .collect()
 }
 
@@ -116,7 +113,8 @@ fn change(frame: &PathFrame, neighbour: &PathFrame, which: usize) -> Change {
     let mut sum = Change::default();
     let mut seen = 0.0;
     for (point, (x, y)) in frame.probe.iter().zip(PathFrame::probe_positions(&frame.view)) {
-        let Some(at) = on_image(point.position, point.z) else {
+        let shift = point.shifts[which].as_dvec3();
+        let Some(at) = on_image(point.position + shift, point.z) else {
             sum.outside += 1.0;
             continue;
         };
@@ -126,13 +124,14 @@ fn change(frame: &PathFrame, neighbour: &PathFrame, which: usize) -> Change {
         }
         let moved = at.distance(DVec2::new(x, y));
         sum.pixels += moved;
+        sum.moved += f64::from(u8::from(shift != DVec3::ZERO && moved > STILL));
         seen += 1.0;
         let ray = frame.view.ray(x, y);
         if travels && on_image(ray.origin + ray.direction * nearest, nearest).is_none() {
             sum.contested += 1.0;
         } else if point.is_edge {
             sum.edges += f64::from(u8::from(moved > STILL));
-        } else if let [Some(right), Some(below)] = point.beside.map(|p| project(p, point.z)) {
+        } else if let [Some(right), Some(below)] = point.beside.map(|p| project(p + shift, point.z)) {
             // How many of the neighbour's pixels, and so samples, fall on one of this frame.
             let samples = (right - at).perp_dot(below - at).abs();
             sum.stretched += (1.0 - samples).max(0.0);
@@ -145,7 +144,7 @@ fn change(frame: &PathFrame, neighbour: &PathFrame, which: usize) -> Change {
         contested: sum.contested / all,
         stretched: sum.stretched / all,
         edges: sum.edges / all,
-        moved: 0.0,
+        moved: sum.moved / all,
         pixels: sum.pixels / f64::max(seen, 1.0),
     }
 }

@@ -1,7 +1,7 @@
 //! What frames cost in counted rays and pixels, and what share of an inferred frame is traced.
 //!
-//! Every number here is fitted by `cargo bench --bench planner`; `docs/planning.md` says on what, and how well they
-//! predict.
+//! Most numbers are what `cargo bench --bench planner` fits or measures, rounded; those that are not say so. `docs/planning.md` says
+//! how well they predict.
 
 use super::Change;
 use crate::frame::{FrameKind, Quality, RayCounts};
@@ -24,7 +24,8 @@ pub struct Weights {
     pub stretched: f64,
     /// Pixels traced at edges for each of [`Change::edges`].
     pub edges: f64,
-    /// Share of [`Change::moved`] that is traced: around outlines, and what comes out from behind them.
+    /// Share of [`Change::moved`] that is traced: around outlines, and what comes out from behind them. An estimate: how much that is
+    /// hangs on how finely the thing is divided.
     pub moved: f64,
     /// Share of pixels missed once samples lie at random.
     pub missed: f64,
@@ -36,7 +37,7 @@ pub struct Weights {
     pub inference: f64,
     /// Shadow rays that a traced pixel of an inferred frame takes, of those that one of a key frame takes.
     pub shadows: f64,
-    /// Rays that prove a reused sample visible.
+    /// Rays that prove a reused sample visible. Not fitted: it follows from which samples are asked.
     pub proof: f64,
 }
 
@@ -69,6 +70,7 @@ impl Weights {
         scatter_pixels: 1.0,
         inference: 0.7,
         shadows: 0.78,
+        // One in 1024, or in 256 where what is seen grows.
         proof: 1.0 / 256.0,
     };
 
