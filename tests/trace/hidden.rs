@@ -97,9 +97,9 @@ proptest! {
 #[test]
 fn a_wall_alone_is_seen_at_one_look() {
     let eye = DVec3::ZERO;
-    for (x_turn, y_turn) in [(0.0, 0.0), (1.2, 0.3), (-0.4, -1.3)] {
-        let look = Look::new(wall(-3.0, x_turn, y_turn), 300.0, eye, |_| {});
-        // Where its horizon is in view, tiles that it passes through are of two kinds, and those beside it reach far.
+    for (x_turn, y_turn, half) in [(0.0, 0.0, 300.0), (1.2, 0.3, 30.0), (-0.4, -1.3, 30.0)] {
+        let look = Look::new(wall(-3.0, x_turn, y_turn), half, eye, |_| {});
+        // Where its end is in view, tiles that it passes through are of two kinds, and those beside it reach far.
         let seen = look.seen(16) as f64 / (SIDE * SIDE) as f64;
         assert!(if x_turn == 0.0 { seen == 1.0 } else { seen > 0.7 }, "{x_turn} {y_turn}: {seen}");
     }
@@ -107,6 +107,8 @@ fn a_wall_alone_is_seen_at_one_look() {
     let place = DVec3::new(1e4, -2e4, 3e4);
     let turned = DAffine3::from_translation(place) * wall(-3.0, 0.4, 0.3);
     assert_eq!(Look::new(turned, 50.0, place, |_| {}).seen(8), SIDE * SIDE);
+    // So do those of a triangle a hundred times as large as it is far: it is left to rays.
+    assert_eq!(Look::new(wall(-3.0, 1.2, 0.3), 3000.0, eye, |_| {}).seen(16), 0);
 }
 
 #[test]
