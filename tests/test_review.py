@@ -21,9 +21,9 @@ FRAMES = range(50, 70)
 
 @pytest.fixture(scope="module")
 def sequence(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Frames 50-69 of courtyard, with a cut at 60, under a name with a space."""
+    """Frames 50-69 of courtyard, with a cut at 60 and key frames, under a name with a space."""
     out = tmp_path_factory.mktemp("review") / "a folder"
-    convert(ROOT / "scenes/courtyard/courtyard.gltf", out, "-r", "96x54", "-f", "50-69", "--aov", "depth,class,object", "--name", "yard one.####.exr")
+    convert(ROOT / "scenes/courtyard/courtyard.gltf", out, "-r", "96x54", "-f", "50-69", "--segment", "12", "--aov", "depth,class,object", "--name", "yard one.####.exr")
     return out
 
 
