@@ -20,8 +20,7 @@ const WORTH_A_WORD: u64 = 256 << 20;
 const BYTES_PER_THREAD: u64 = 2 << 20;
 
 /// An error if rendering is estimated to take more than `allowed` bytes, or where nothing is said more than the machine has.
-/// To be asked once the scene is read and planned.
-/// What is held besides, for the run, are so many bytes.
+/// To be asked once the scene is read and planned. The run holds so many bytes `besides`.
 pub fn refuse_over(allowed: Option<u64>, job: &Job, besides: u64) -> Result<()> {
     let held = peak_bytes();
     if allowed.is_some() && held == 0 {

@@ -81,6 +81,7 @@ pub(super) struct Pass<'a, R> {
     pub view: &'a Projector,
     /// Whether the camera moves.
     moves: bool,
+    /// Where nothing can have come in before what has stayed; none where that is everywhere.
     known: Option<KnownArea<'a>>,
     grid: Grid,
     pub rays: &'a R,

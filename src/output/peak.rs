@@ -83,6 +83,7 @@ mod tests {
         #[cfg(target_os = "linux")]
         assert!(most_bytes().is_some_and(|most| most > peak_bytes()));
     }
+
     #[test]
     fn limits_of_groups_are_looked_for_up_to_the_top() {
         assert_eq!(

@@ -21,7 +21,7 @@ pub(super) struct Middles {
 }
 
 impl Middles {
-    /// Those of `rows` x `rows` parts, as many as [`GRID`] at most.
+    /// Those of `rows` x `rows` parts, from 1 to [`GRID`] rows.
     pub fn of(rows: u32) -> &'static [Self] {
         static GRIDS: LazyLock<[Vec<Middles>; GRID as usize]> = LazyLock::new(|| {
             array::from_fn(|i| {
@@ -31,7 +31,8 @@ impl Middles {
                 parts.chunks(LANES).map(Middles::new).collect()
             })
         });
-        &GRIDS[rows as usize - 1]
+        // What extreme input makes no number of is 0.
+        &GRIDS[rows.clamp(1, GRID) as usize - 1]
     }
 
     /// Of points of the unit square.

@@ -4,6 +4,7 @@
 use crate::rig::{buzz, channels, frames_in, fresh, run};
 use crate::stage::{CAMERA, CARD, LAMP, Stage};
 use serde_json::{Value, json};
+use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
 
@@ -122,10 +123,28 @@ fn a_pool_of_light_that_was_too_small_to_be_sampled_is_found_as_it_grows() {
     }
 }
 
-#[test]
-fn what_is_near_is_seen_when_it_comes_in_though_it_is_small() {
+/// Renders a stage in which the camera takes `path`, by full and inferred from its first frame; calls `check` with the layers of each
+/// frame of both.
+fn compare(
+    mut stage: Stage,
+    path: &[[f32; 3]],
+    options: &str,
+    check: impl Fn(&str, [BTreeMap<String, Vec<f32>>; 2]),
+) {
     let (folder, out) = fresh();
     let full = folder.path().join("full");
+    stage.translate(CAMERA, path);
+    let scene = stage.write(&folder.path().join("s.gltf"));
+    let plan = all_from_the_first(&scene, path.len());
+    run(&scene, &full, &format!("{options} -q full")).ok();
+    run(&scene, &out, &format!("{options} --plan {}", plan.display())).ok();
+    for frame in frames_in(&out) {
+        check(&frame, [&out, &full].map(|folder| channels(&folder.join(&frame))));
+    }
+}
+
+#[test]
+fn what_is_near_is_seen_when_it_comes_in_though_it_is_small() {
     let mut stage = Stage::new();
     // They move by ten pixels a frame, all that is behind them by two, and five pixels wide they pass the outermost ones between
     // two frames.
@@ -137,36 +156,23 @@ fn what_is_near_is_seen_when_it_comes_in_though_it_is_small() {
         stage.json["scenes"][0]["nodes"].as_array_mut().unwrap().push(json!(node));
     }
     let path: Vec<[f32; 3]> = (0..12).map(|i| [0.08 * i as f32, 1.0, 6.0]).collect();
-    stage.translate(CAMERA, &path);
-    let scene = stage.write(&folder.path().join("s.gltf"));
-    let plan = all_from_the_first(&scene, path.len());
-    run(&scene, &full, "-r 192x108 --aov object -q full").ok();
-    run(&scene, &out, &format!("-r 192x108 --aov object --plan {}", plan.display())).ok();
-    for frame in frames_in(&out) {
-        let objects = |folder: &Path| channels(&folder.join(&frame))["objectId.id"].clone();
-        let wrong = objects(&out).iter().zip(&objects(&full)).filter(|(a, b)| a != b).count();
+    compare(stage, &path, "-r 192x108 --aov object", |frame, [shown, truth]| {
+        let objects = shown["objectId.id"].iter().zip(&truth["objectId.id"]);
         // Each covers thirty.
+        let wrong = objects.filter(|(a, b)| a != b).count();
         assert!(wrong <= 5, "{frame}: {wrong}");
-    }
+    });
 }
 
 #[test]
 fn the_parts_of_one_object_have_outlines() {
-    let (folder, out) = fresh();
-    let full = folder.path().join("full");
     let mut stage = Stage::new();
     stage.bars_before_a_pane(8);
     let path: Vec<[f32; 3]> = (0..12).map(|i| [0.03 * i as f32, 1.0, 6.0]).collect();
-    stage.translate(CAMERA, &path);
-    let scene = stage.write(&folder.path().join("s.gltf"));
-    let plan = all_from_the_first(&scene, path.len());
-    run(&scene, &full, "-r 192x108 -q full").ok();
-    run(&scene, &out, &format!("-r 192x108 --plan {}", plan.display())).ok();
-    for frame in frames_in(&out) {
-        let [shown, truth] = [&out, &full].map(|folder| channels(&folder.join(&frame)));
+    compare(stage, &path, "-r 192x108", |frame, [shown, truth]| {
         let differs = |i: &usize| ["R", "B"].iter().any(|c| (shown[*c][*i] - truth[*c][*i]).abs() > 0.3);
         let wrong = (0..truth["R"].len()).filter(differs).count();
         // When the parts of an object were taken for one surface, up to 67 were.
         assert!(wrong <= 4, "{frame}: {wrong}");
-    }
+    });
 }
