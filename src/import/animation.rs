@@ -4,7 +4,7 @@ use super::{
     accessor::{Accessors, Integers},
     document::Element,
     ignored::Notes,
-    light_camera::{Carried, LUMENS_PER_WATT},
+    light_camera::{LUMENS_PER_WATT, OnNodes},
     nodes::Nodes,
 };
 use crate::{
@@ -16,8 +16,8 @@ use std::collections::HashMap;
 /// What channels may aim at.
 pub(super) struct Targets<'a> {
     pub nodes: &'a mut Nodes,
-    pub cameras: &'a Carried<Camera>,
-    pub lights: &'a Carried<Light>,
+    pub cameras: &'a OnNodes<Camera>,
+    pub lights: &'a OnNodes<Light>,
 }
 
 /// The channels, and when they have keys.

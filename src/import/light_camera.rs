@@ -19,7 +19,7 @@ pub(super) const LUMENS_PER_WATT: f32 = 683.0;
 const LONGEST_SENSOR: f64 = 1e6;
 
 /// Cameras or lights, and which of the file's each one is: animations speak of those.
-pub(super) struct Carried<T> {
+pub(super) struct OnNodes<T> {
     /// In node order of the file.
     pub items: Vec<T>,
     /// For each item, the file's camera or light.
@@ -27,8 +27,8 @@ pub(super) struct Carried<T> {
 }
 
 /// Reads the cameras of all nodes, whichever scene they are in: a shot's camera is sometimes kept apart.
-pub(super) fn cameras(document: &Document, nodes: &Nodes, notes: &Notes) -> Result<Carried<Camera>> {
-    let mut out = Carried { items: Vec::new(), sources: Vec::new() };
+pub(super) fn cameras(document: &Document, nodes: &Nodes, notes: &Notes) -> Result<OnNodes<Camera>> {
+    let mut out = OnNodes { items: Vec::new(), sources: Vec::new() };
     for (i, node) in document.elements("nodes")?.iter().enumerate() {
         let Some(source) = node.index("camera")? else { continue };
         let element = document.element("cameras", source, &node.place)?;
@@ -91,8 +91,8 @@ fn height_of_sensor(extras: &Element) -> Result<Option<f64>> {
 }
 
 /// Reads the lights of the nodes in the scene.
-pub(super) fn lights(document: &Document, nodes: &Nodes, notes: &Notes) -> Result<Carried<Light>> {
-    let mut out = Carried { items: Vec::new(), sources: Vec::new() };
+pub(super) fn lights(document: &Document, nodes: &Nodes, notes: &Notes) -> Result<OnNodes<Light>> {
+    let mut out = OnNodes { items: Vec::new(), sources: Vec::new() };
     let lights = match document.root().extension("KHR_lights_punctual") {
         Some(extension) => extension.items("lights")?,
         None => Vec::new(),

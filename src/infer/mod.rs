@@ -12,7 +12,7 @@
 //! | the four by four matrix, d / (d + z_t) | [`Projector`] |
 //! | good, missed, overlapped, bad pixels | [`PixelClass`] |
 //! | miny, (begx, begy) | depth and pixel of a landing, in [`project()`] |
-//! | L, C, C1, (endx, endy), int_z | `Line` in `obscured.rs` |
+//! | L, C, C1, (endx, endy), int_z | `ImageLine` in `obscured.rs` |
 //! | test_z | in [`creeping()`] |
 //! | P, k | [`entering()`] |
 //! | X + e z_p / (d + z_p), positive gaps | [`Parallax`], [`other_eye()`], [`in_gaps()`] |

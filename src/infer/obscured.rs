@@ -42,7 +42,7 @@ pub fn obscured(
             }
             let position = old.position[i];
             let direction = old_view.direction_to(position);
-            if let Some(line) = Line::new(new_view, position.extend(1.0), direction.extend(0.0)) {
+            if let Some(line) = ImageLine::new(new_view, position.extend(1.0), direction.extend(0.0)) {
                 let begin = new_view.project_unclipped(position);
                 line.walk(new_view, |pixel, int_z| {
                     // Where nothing landed, what landed around it shows how far away things are.
@@ -115,7 +115,7 @@ impl Projector {
 }
 
 /// C1: the part of L that the new view sees, on the raster.
-struct Line {
+struct ImageLine {
     begin: Vec2,
     end: Vec2,
     /// What is linear on the raster: 1/z in perspective, z in parallel projection; at `begin` and `end`.
@@ -123,7 +123,7 @@ struct Line {
     perspective: bool,
 }
 
-impl Line {
+impl ImageLine {
     /// Projects the line from a point towards a direction (homogeneous) and clips it to the view: its near side and
     /// the four sides of the window, all linear in s of H(s) = (1 - s) A + s B.
     fn new(view: &Projector, from: Vec4, towards: Vec4) -> Option<Self> {

@@ -180,7 +180,7 @@ impl Voxels {
         let along = Vec3::from(line.direction) * self.per_metre;
         let side = BRICK as f32;
         let first = (self.voxel(start) / BRICK).as_ivec3();
-        let mut bricks = Steps::new(start / side, along / side, first);
+        let mut bricks = Walk::new(start / side, along / side, first);
         let mut passed = 0.0;
         loop {
             let word = self.bits[self.brick(bricks.cell.as_uvec3())];
@@ -190,7 +190,7 @@ impl Voxels {
                 let corner = bricks.cell.as_vec3() * side;
                 let entry = (start + along * passed - corner).clamp(Vec3::ZERO, Vec3::splat(side));
                 let voxel = entry.as_ivec3().min(IVec3::splat(BRICK as i32 - 1));
-                let mut voxels = Steps::new(entry, along, voxel);
+                let mut voxels = Walk::new(entry, along, voxel);
                 loop {
                     let marked = word >> bit(voxels.cell.as_uvec3()) & 1 != 0;
                     if marked && !inside {
@@ -216,7 +216,7 @@ fn bit(at: UVec3) -> u32 {
 }
 
 /// The cells of a grid that a line passes, one after the other (Amanatides and Woo 1987, "A Fast Voxel Traversal Algorithm").
-struct Steps {
+struct Walk {
     cell: IVec3,
     step: IVec3,
     /// How far along the line the next cell begins on each axis, as a multiple of its direction.
@@ -225,7 +225,7 @@ struct Steps {
     across: Vec3,
 }
 
-impl Steps {
+impl Walk {
     /// Those of the line from `start`, which lies in `first`, along `along`, in cells.
     fn new(start: Vec3, along: Vec3, first: IVec3) -> Self {
         let still = along.cmpeq(Vec3::ZERO);

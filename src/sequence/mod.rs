@@ -4,11 +4,11 @@
 
 mod antialias;
 mod caster;
-mod emitter;
 mod motion;
 mod outward;
 mod path;
 mod resolve;
+mod segment;
 mod shot;
 mod stereo;
 
@@ -23,9 +23,9 @@ use crate::plan::{Plan, Segment};
 use crate::scene::{Requirements, Scene, Stereo};
 use crate::trace::{TraceOptions, Tracer, lit_words};
 use antialias::Antialias;
-use emitter::Emitter;
 use outward::Stage;
 use resolve::MatteNames;
+use segment::SegmentRenderer;
 use shot::Shot;
 use std::collections::BTreeSet;
 
@@ -200,13 +200,13 @@ fn render_buffers(settings: &Settings, infers: bool) -> usize {
 /// What inference needs between frames; swapped, never made anew.
 #[derive(Default)]
 struct Buffers {
-    carried: Carried,
+    carried: InferenceBuffers,
     antialias: Antialias,
 }
 
 /// Samples, and what they are inferred with.
 #[derive(Default)]
-struct Carried {
+struct InferenceBuffers {
     key: BuzzBuffer,
     old: BuzzBuffer,
     new: BuzzBuffer,
@@ -219,7 +219,7 @@ impl Buffers {
     /// Makes room for the buffers that [`render_buffers`] counts.
     fn fit(&mut self, settings: &Settings, infers: bool, lit_words: usize) {
         let (width, height) = (settings.window.width as usize, settings.window.height as usize);
-        let Carried { key, old, new, right, .. } = &mut self.carried;
+        let InferenceBuffers { key, old, new, right, .. } = &mut self.carried;
         let right = settings.stereo.map(|_| right);
         let carried = [key, old, new];
         for buffer in right.into_iter().chain(carried).take(render_buffers(settings, infers)) {
@@ -250,7 +250,7 @@ fn render_segment(
     buffers.fit(settings, infers, lit_words(scene, settings.trace_options()));
     let names = settings.aovs.contains(Aov::Crypto).then(|| MatteNames::of(scene));
     let Buffers { carried, antialias } = buffers;
-    let mut emitter = Emitter {
+    let mut renderer = SegmentRenderer {
         scene,
         settings,
         segment,
@@ -266,9 +266,9 @@ fn render_segment(
 
     accel.place(scene, &key_shot.pose, origin);
     let tracer = Tracer::new(scene, accel, &key_shot.pose, settings.trace_options());
-    let stats = emitter.trace(&tracer, &key_shot, &mut carried.key, &mut carried.inference);
-    emitter.emit((accel, &tracer), &key_shot, &carried.key, stats)?;
-    emitter.emit_right(
+    let stats = renderer.trace(&tracer, &key_shot, &mut carried.key, &mut carried.inference);
+    renderer.emit((accel, &tracer), &key_shot, &carried.key, stats)?;
+    renderer.emit_right(
         (accel, &tracer),
         (&carried.key, &key_shot),
         &mut carried.right,
@@ -279,7 +279,7 @@ fn render_segment(
     } else {
         Stage::Still { accel, tracer: &tracer }
     };
-    emitter.infer_outward(stage, key_shot, carried)
+    renderer.infer_outward(stage, key_shot, carried)
 }
 
 #[cfg(test)]
@@ -294,7 +294,7 @@ mod tests {
             for infers in [false, true] {
                 let mut buffers = Buffers::default();
                 buffers.fit(&settings, infers, 1);
-                let Carried { key, old, new, right, .. } = &buffers.carried;
+                let InferenceBuffers { key, old, new, right, .. } = &buffers.carried;
                 let made = [key, old, new, right].into_iter().filter(|b| b.width() > 0).count();
                 assert_eq!(made, render_buffers(&settings, infers));
                 assert_eq!((key.width(), right.width() > 0), (3, stereo.is_some()));

@@ -2,7 +2,7 @@
 
 use super::motion::SceneMotion;
 use super::shot::Shot;
-use super::{Carried, Emitter};
+use super::{InferenceBuffers, SegmentRenderer};
 use crate::Result;
 use crate::accel::Accel;
 use crate::infer::Move;
@@ -17,16 +17,16 @@ pub(super) enum Stage<'a> {
     Moving { accel: &'a mut Accel, placed: Pose },
 }
 
-impl Emitter<'_> {
+impl SegmentRenderer<'_> {
     /// Infers and finishes the frames before the key frame and those after it, as far as a wanted one lies.
     pub(super) fn infer_outward(
         &mut self,
         mut stage: Stage<'_>,
         key_shot: Shot,
-        carried: &mut Carried,
+        carried: &mut InferenceBuffers,
     ) -> Result<()> {
         let (scene, settings, key_frame) = (self.scene, self.settings, self.segment.key);
-        let Carried { key, old, new, right, inference } = carried;
+        let InferenceBuffers { key, old, new, right, inference } = carried;
         let needs = Requirements::of(scene);
         let before = self.wanted.first().copied().unwrap_or(key_frame)..key_frame;
         let after = key_frame + 1..=self.wanted.last().copied().unwrap_or(key_frame);

@@ -1,6 +1,6 @@
 //! The right eye of a stereo pair, from the left one of the same frame.
 
-use super::Emitter;
+use super::SegmentRenderer;
 use super::shot::Shot;
 use crate::Result;
 use crate::accel::Accel;
@@ -8,7 +8,7 @@ use crate::frame::{Quality, StereoEye};
 use crate::infer::{BuzzBuffer, Inference, Move};
 use crate::trace::Tracer;
 
-impl Emitter<'_> {
+impl SegmentRenderer<'_> {
     /// In stereo, makes and finishes the right eye of a frame that is wanted. Nothing else hangs on it: the next frame's
     /// comes from its own left eye, so an error is not carried on.
     pub(super) fn emit_right(

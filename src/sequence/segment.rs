@@ -18,7 +18,7 @@ use std::collections::BTreeSet;
 use std::time::Instant;
 
 /// Turns samples into frames and hands them over.
-pub(super) struct Emitter<'a> {
+pub(super) struct SegmentRenderer<'a> {
     pub scene: &'a Scene,
     pub settings: &'a Settings,
     pub segment: &'a Segment,
@@ -33,7 +33,7 @@ pub(super) struct Emitter<'a> {
     pub observer: &'a mut dyn Observer,
 }
 
-impl Emitter<'_> {
+impl SegmentRenderer<'_> {
     pub fn caster<'a>(
         &'a self,
         tracer: &'a Tracer<'a>,
