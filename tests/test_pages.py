@@ -39,7 +39,7 @@ def pages(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     out = tmp_path_factory.mktemp("pages")
     convert(COURTYARD, out / "frames", "-r", "320x180", "-f", "60-69")
     convert(COURTYARD, out / "frames", "-r", "320x180", "-f", "50-69", "--skip-existing", "--report", str(out / "frames/report.json"))
-    buzz("trade", COURTYARD, out / "trade", "-r", "160x90", "-f", "50-69")
+    buzz("trade", COURTYARD, out / "trade", "-r", "96x54", "-f", "50-69")
     return {"report": out / "frames/report.html", "trade": out / "trade/trade.html"}
 
 
