@@ -1,4 +1,4 @@
-//! From samples to finished frames, one by one.
+//! One segment's frames: traced or inferred, finished and handed over, one by one.
 
 use super::antialias::Antialias;
 use super::caster::{Caster, mix};
@@ -17,7 +17,7 @@ use glam::DVec3;
 use std::collections::BTreeSet;
 use std::time::Instant;
 
-/// Turns samples into frames and hands them over.
+/// Renders the frames of one segment: fills buffers with samples, turns these into frames and hands them over.
 pub(super) struct SegmentRenderer<'a> {
     pub scene: &'a Scene,
     pub settings: &'a Settings,
