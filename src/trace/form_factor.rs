@@ -1,7 +1,8 @@
 //! Irradiance of evenly bright shapes in closed form: the integral of the cosine over the directions in which they are
 //! seen, those below the horizon left out.
 
-use glam::DVec3;
+use super::lanes::Lanes;
+use glam::{DVec3, Vec4};
 use std::f64::consts::PI;
 
 /// The integral over a disc in the sky, as a share of that of one overhead. `cos` is the cosine between the normal and
@@ -22,6 +23,13 @@ pub(super) fn disc_share(cos: f32, sin: f32) -> f32 {
     let y = (-x * c / height).clamp(-1.0, 1.0);
     let z = height * (1.0 - y * y).sqrt();
     (((c * y.acos() - x * z) * s * s + z.atan2(x)) / (PI * s * s)).max(0.0) as f32
+}
+
+/// [`disc_share`] for four discs.
+#[inline]
+pub(super) fn disc_shares(cosines: Vec4, sines: Vec4) -> Vec4 {
+    let cut = Lanes::above_zero(sines - cosines) & Lanes::above_zero(sines + cosines);
+    cut.replace(cosines.max(Vec4::ZERO), |lane| disc_share(cosines[lane], sines[lane]))
 }
 
 /// Corners that a polygon may have.

@@ -2,7 +2,7 @@
 
 use super::lanes::{Lanes, Vec3x4};
 use glam::{Vec2, Vec3, Vec4, Vec4Swizzles};
-use std::f32::consts::{FRAC_1_PI, PI};
+use std::f32::consts::FRAC_1_PI;
 
 /// Schlick's Fresnel term.
 #[inline]
@@ -33,6 +33,15 @@ pub(super) fn dielectric(cos: f32, eta: f32) -> f32 {
     0.5 * (parallel * parallel + perpendicular * perpendicular)
 }
 
+/// How far the Fresnel term is from the first of [`Surface::reflectances`](super::surface::Surface::reflectances) to the second, for
+/// four cosines between view and half vector.
+pub(super) fn grazing(cosines: Vec4, eta: Option<f32>) -> Vec4 {
+    match eta {
+        Some(eta) => cosines.map(|cos| dielectric(cos, eta)),
+        None => schlick_weights(cosines),
+    }
+}
+
 /// `incident` (unit, towards the surface) bent at a surface with unit `normal` against it; `None` where everything is
 /// reflected.
 pub(super) fn refract(incident: Vec3, normal: Vec3, eta: f32) -> Option<Vec3> {
@@ -43,9 +52,9 @@ pub(super) fn refract(incident: Vec3, normal: Vec3, eta: f32) -> Option<Vec3> {
 
 /// GGX's density of half vectors, 1/sr; `nh2` is the square of their cosine to the normal, `a2` that of alpha.
 #[inline]
-pub(super) fn density(nh2: f32, a2: f32) -> f32 {
-    let d = nh2 * (a2 - 1.0) + 1.0;
-    a2 / (PI * d * d)
+pub(super) fn density(nh2: Vec4, a2: Vec4) -> Vec4 {
+    let d = nh2 * (a2 - 1.0) + Vec4::ONE;
+    a2 * FRAC_1_PI / (d * d)
 }
 
 /// BRDF without its Fresnel term for four pairs of a light and a point, given as unit directions to the lights with their
@@ -56,7 +65,7 @@ pub(super) fn lobes(
     normals: Vec3x4,
     views: Vec3x4,
     (to_lights, cosines): (Vec3x4, Vec4),
-    alpha: Vec4,
+    a2: Vec4,
     min: f32,
     asked: Lanes,
 ) -> Option<(Vec4, Vec4)> {
@@ -64,10 +73,8 @@ pub(super) fn lobes(
     let square = half.length_squared();
     let nv = normals.dot(views);
     let along = (cosines + nv).max(Vec4::ZERO);
-    let a2 = alpha * alpha;
     // Opposite directions have no half vector: NaN, which `min` gives back only as its second argument.
-    let d = Vec4::ONE.min(along * along / square) * (a2 - 1.0) + Vec4::ONE;
-    let density = a2 * FRAC_1_PI / (d * d);
+    let density = density(Vec4::ONE.min(along * along / square), a2);
     let counted = Lanes::above_zero(asked.select(density) - Vec4::splat(min));
     if counted.is_empty() {
         return None;

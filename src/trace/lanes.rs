@@ -192,16 +192,27 @@ impl Lanes {
         !self.0.any()
     }
 
-    /// Those of them for which `keep` says so.
+    /// True if it is one of them.
+    pub fn has(self, lane: usize) -> bool {
+        self.0.bitmask() >> lane & 1 != 0
+    }
+
+    /// `others`, but in these lanes what `value` says, one by one.
     #[inline]
-    pub fn filter(self, mut keep: impl FnMut(usize) -> bool) -> Self {
-        let mut bits = self.0.bitmask();
-        for lane in 0..LANES {
-            if bits >> lane & 1 != 0 && !keep(lane) {
-                bits &= !(1 << lane);
-            }
+    pub fn replace(self, others: Vec4, mut value: impl FnMut(usize) -> f32) -> Vec4 {
+        if self.is_empty() {
+            return others;
         }
-        Self::from_bits(bits)
+        let mut values = others.to_array();
+        let lanes = values.iter_mut().enumerate().filter(|&(lane, _)| self.has(lane));
+        lanes.for_each(|(lane, place)| *place = value(lane));
+        Vec4::from_array(values)
+    }
+
+    /// Those of them that are not `others`.
+    #[inline]
+    pub fn without(self, others: Self) -> Self {
+        Self(self.0 & !others.0)
     }
 
     /// `values` in these lanes, 0 in the others.

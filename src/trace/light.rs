@@ -15,7 +15,7 @@ use std::f32::consts::{PI, TAU};
 pub(super) const MIN_DISTANCE: f32 = 1e-10;
 
 /// A spot's cone that changes less than this over its sphere, before it is squared, is taken at the sphere's middle.
-const LEVEL_CONE: f32 = 0.05;
+pub(super) const LEVEL_CONE: f32 = 0.05;
 
 /// A light prepared for many points.
 #[derive(Debug, Clone)]
@@ -72,6 +72,13 @@ pub(super) struct Unshadowed {
 }
 
 impl Emitter {
+    /// No light.
+    pub const DARK: Self = Self {
+        shape: Shape::Directional { to_light: Vec3::ZERO, sin: 0.0 },
+        intensity: Vec3::ZERO,
+        per_range: 0.0,
+    };
+
     /// `light` relative to `origin`.
     pub fn new(light: &PosedLight, origin: DVec3) -> Self {
         let position = (light.position - origin).as_vec3();
@@ -252,7 +259,7 @@ impl Cone {
     }
 
     /// The mean over parts of a sphere around `axis`, `sin` the sine of the half angle that it fills, each weighed by its cosine.
-    fn mean(&self, normal: Vec3, axis: Vec3, sin: f32) -> f32 {
+    pub fn mean(&self, normal: Vec3, axis: Vec3, sin: f32) -> f32 {
         // Most spheres lie within the inner cone, or outside of the outer one.
         let middle = -self.direction.dot(axis) * self.scale + self.offset;
         let most = self.scale * (2.0 * height(sin)).sqrt();
@@ -278,6 +285,13 @@ impl Cone {
 /// 1 less the cosine of the angle with this sine.
 pub(super) fn height(sin: f32) -> f32 {
     sin * sin / (1.0 + (1.0 - sin * sin).sqrt())
+}
+
+/// [`height`] for four sines.
+#[inline]
+pub(super) fn heights(sines: Vec4) -> Vec4 {
+    let squares = sines * sines;
+    squares / (Vec4::ONE + (Vec4::ONE - squares).sqrt())
 }
 
 /// The direction to a part of a sphere, and how far away its surface is there. From inside, where light comes from all

@@ -8,7 +8,6 @@
 //! camera gives the same values frame after frame.
 
 mod changes;
-mod delta_lights;
 mod eye;
 mod form_factor;
 mod ggx;
@@ -21,6 +20,7 @@ mod light;
 mod panel;
 mod parts;
 mod point;
+mod punctual;
 mod reach;
 mod receivers;
 mod sequence;
@@ -34,12 +34,12 @@ use crate::accel::{Accel, Sides};
 use crate::frame::{PackedNormal, RayCounts, SurfaceRef, SurfaceSample};
 use crate::scene::{Pose, Scene, View};
 pub use changes::LightChanges;
-use delta_lights::{DeltaLights, is_delta};
 pub use eye::Eye;
 use glam::{Vec3, Vec4};
 use interaction::{Beam, SurfaceInteraction, footprints};
 use light::Emitter;
 use point::{Side, SurfacePoint};
+use punctual::{PunctualLights, is_punctual};
 use shader::finite;
 pub use shader::{SHADED_AT_ONCE, Shader};
 use std::f32::consts::FRAC_1_PI;
@@ -95,12 +95,12 @@ pub struct Tracer<'a> {
     accel: &'a Accel,
     options: TraceOptions,
     lights: Vec<Emitter>,
-    /// Those of them that never have a size, four at a time.
-    delta_lights: Vec<DeltaLights>,
+    /// The punctual ones of them, four at a time.
+    punctual_lights: Vec<PunctualLights>,
     /// The same one by one, each for four points.
-    single_lights: Vec<(Field, DeltaLights)>,
-    /// The numbers of the others: those that have a size, now or at some time.
-    sized_lights: Vec<usize>,
+    single_lights: Vec<(Field, PunctualLights)>,
+    /// The numbers of the others.
+    area_lights: Vec<usize>,
     layout: Layout,
     world: Surroundings<'a>,
     /// In the order of the scene's materials.
@@ -116,9 +116,9 @@ impl<'a> Tracer<'a> {
             scene,
             accel,
             options,
-            delta_lights: DeltaLights::groups(&lights, &layout.lights),
-            single_lights: DeltaLights::singles(&lights, &layout.lights),
-            sized_lights: (0..lights.len()).filter(|&n| !is_delta(&lights[n], layout.lights[n])).collect(),
+            punctual_lights: PunctualLights::groups(&lights),
+            single_lights: PunctualLights::singles(&lights, &layout.lights),
+            area_lights: (0..lights.len()).filter(|&n| !is_punctual(&lights[n])).collect(),
             lights,
             layout,
             world: Surroundings::new(scene),

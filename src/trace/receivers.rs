@@ -1,10 +1,10 @@
-//! Four points under lights without size: one light for each of them, or four lights for one that is there four times.
+//! Four points under punctual lights: one light for each of them, or four lights for one that is there four times.
 
-use super::delta_lights::{DeltaLights, Unshadowed4};
 use super::ggx::{dielectric, lobes, schlick_weights};
-use super::highlight::MIN_LOBE;
+use super::highlight::{Cut, Glossy, MIN_LOBE};
 use super::interaction::SurfaceInteraction;
 use super::lanes::{LANES, Lanes, Vec3x4};
+use super::punctual::{PunctualLights, Unshadowed4};
 use super::surface::Surface;
 use glam::{Vec3, Vec4};
 use std::array;
@@ -74,32 +74,68 @@ impl Receivers {
         }
     }
 
-    /// Adds what those of `lights` bring that are `asked` for and `reach` the points, which is not asked where they would
-    /// bring nothing to the eye.
+    /// Adds what those of `lights` bring that are `asked` for. `reach` says which share of each reaches the point; it is not asked
+    /// where they would bring nothing to the eye.
     #[inline]
     pub fn add(
         &self,
-        lights: &DeltaLights,
+        lights: &PunctualLights,
         asked: Lanes,
-        reach: impl FnOnce(Lanes) -> Lanes,
+        reach: impl FnOnce(Lanes) -> Vec4,
         sum: &mut Brought,
     ) {
-        let Unshadowed4 { strengths, to_lights, cosines } = lights.unshadowed(self.positions, self.normals);
-        let shining = Lanes::above_zero(asked.select(strengths));
+        let unshadowed = lights.unshadowed(self.positions, self.normals);
+        let shining = Lanes::above_zero(asked.select(unshadowed.strengths));
         if shining.is_empty() {
             return;
         }
-        let to_lights = (to_lights, cosines);
-        let mirrored =
-            lobes(self.normals, self.toward, to_lights, self.alpha, MIN_LOBE, shining & self.mirror);
-        let highlit = mirrored.map_or(Lanes::NONE, |(lobes, _)| Lanes::above_zero(lobes));
-        let light = reach(shining & self.scatter | highlit).select(strengths);
+        let mirrored = self.mirrored(lights, &unshadowed, shining & self.mirror);
+        let highlit = mirrored.map_or(Lanes::NONE, |[a, b]| Lanes::above_zero(a + b));
+        let asked = shining & self.scatter | highlit;
+        let light = asked.select(unshadowed.strengths) * reach(asked);
         sum.irradiance += lights.colors * light;
-        if let Some((lobes, cosines)) = mirrored {
-            let light = light * lobes;
-            let grazing = light * self.grazing(cosines);
-            sum.highlights[0] += lights.colors * (light - grazing);
-            sum.highlights[1] += lights.colors * grazing;
+        if let Some([at_normal, at_grazing]) = mirrored {
+            sum.highlights[0] += lights.colors * (light * at_normal);
+            sum.highlights[1] += lights.colors * (light * at_grazing);
+        }
+    }
+
+    /// How much of what comes from `lights` that are `asked` for is mirrored, 1/sr: where the reflectance at normal incidence is 1,
+    /// and where that at grazing is. `None` where nothing is.
+    #[inline]
+    fn mirrored(&self, lights: &PunctualLights, from: &Unshadowed4, mut asked: Lanes) -> Option<[Vec4; 2]> {
+        let (mut squares, mut single, mut parted) = (self.alpha * self.alpha, asked, Lanes::NONE);
+        if lights.has_size() {
+            let seen = (from.to_lights, from.heights, (2.0 * from.heights).sqrt());
+            let cut = Cut::new((self.normals, self.toward, self.alpha), seen);
+            (squares, asked) = (cut.squares, asked & cut.count);
+            parted = asked & Lanes::above_zero(cut.rows - Vec4::ONE);
+            single = asked.without(parted) & Lanes::above_zero(from.cosines);
+        }
+        let to_lights = (from.to_lights, from.cosines);
+        let whole = lobes(self.normals, self.toward, to_lights, squares, MIN_LOBE, single);
+        let mut mirrored = whole.map(|(lobes, cosines)| {
+            let at_grazing = lobes * self.grazing(cosines);
+            [lobes - at_grazing, at_grazing]
+        });
+        if !parted.is_empty() {
+            let [at_normal, at_grazing] = mirrored.get_or_insert_default();
+            for lane in (0..LANES).filter(|&lane| parted.has(lane)) {
+                [at_normal[lane], at_grazing[lane]] =
+                    self.glossy(lane).mirrored(lights.light(lane), from.to_lights.lane(lane));
+            }
+        }
+        mirrored
+    }
+
+    /// The point of a lane.
+    fn glossy(&self, lane: usize) -> Glossy {
+        Glossy {
+            position: self.positions.lane(lane),
+            normal: self.normals.lane(lane),
+            toward: self.toward.lane(lane),
+            alpha: self.alpha[lane],
+            eta: self.bend.has(lane).then_some(self.etas[lane]),
         }
     }
 

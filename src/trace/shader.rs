@@ -120,9 +120,10 @@ impl<'t> Shader<'t, '_> {
         let shaded = Lanes::of(|lane| !points[lane].material.unlit);
         let (receivers, mut brought) = (Receivers::new(&its, surfaces, toward), Brought::default());
         for (field, lights) in &tracer.single_lights {
-            let asked = field.lanes(lit) & shaded;
+            let shares = field.shares(lit);
+            let asked = Lanes::above_zero(shares) & shaded;
             if !asked.is_empty() {
-                receivers.add(lights, asked, |seen| seen, &mut brought);
+                receivers.add(lights, asked, |_| shares, &mut brought);
             }
         }
         let highlights = receivers.highlights(&brought);
@@ -130,7 +131,7 @@ impl<'t> Shader<'t, '_> {
             let (it, surface, toward) = (&its[lane], surfaces[lane], toward.lane(lane));
             let mut incoming = Incoming::default();
             if !points[lane].material.unlit {
-                incoming = tracer.without_delta_lights(it, surface, toward, lit[lane]);
+                incoming = tracer.without_punctual_lights(it, surface, toward, lit[lane]);
                 incoming.irradiance += brought.irradiance.lane(lane);
                 incoming.highlights += highlights.lane(lane);
             }
@@ -166,9 +167,9 @@ impl<'t> Shader<'t, '_> {
 }
 
 impl Tracer<'_> {
-    /// What arrives at a point from the world, and from those lights that have a size.
+    /// What arrives at a point from the world, and from area lights.
     #[inline]
-    fn without_delta_lights(
+    fn without_punctual_lights(
         &self,
         it: &SurfaceInteraction,
         surface: &Surface,
@@ -176,7 +177,7 @@ impl Tracer<'_> {
         lit: &[u32],
     ) -> Incoming {
         let mut incoming = self.skylight(it, self.layout.ambient.map_or(1.0, |field| field.share(lit)));
-        for &number in &self.sized_lights {
+        for &number in &self.area_lights {
             let (light, field) = (&self.lights[number], self.layout.lights[number]);
             if field.is_set(lit)
                 && let Some(unshadowed) = light.unshadowed(it.point.position, it.normal)

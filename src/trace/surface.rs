@@ -1,6 +1,6 @@
 //! What a material says at a point: the inputs of the shading model, textures applied.
 
-use super::ggx::{dielectric, schlick, schlick_weights};
+use super::ggx::{dielectric, schlick};
 use super::interaction::SurfaceInteraction;
 use crate::scene::{AlphaMode, MIRROR_ROUGHNESS, Material, TextureRef};
 use glam::{Vec3, Vec4};
@@ -148,14 +148,6 @@ impl Surface {
         match self.eta {
             Some(_) => [Vec3::ZERO, Vec3::ONE],
             None => [self.f0, Vec3::splat(self.f90)],
-        }
-    }
-
-    /// How far the Fresnel term is from the first of these to the second, for four cosines between view and half vector.
-    pub fn grazing(&self, cosines: Vec4) -> Vec4 {
-        match self.eta {
-            Some(eta) => cosines.map(|cos| dielectric(cos, eta)),
-            None => schlick_weights(cosines),
         }
     }
 

@@ -235,10 +235,14 @@ impl Field {
         self.bits(words) != 0
     }
 
-    /// In which of four samples, given by their words, its bit is set; it must not be a share.
+    /// The shares in the words of four samples.
     #[inline]
-    pub fn lanes(self, words: [&[u32]; LANES]) -> Lanes {
-        Lanes::from_bits((0..LANES).fold(0, |bits, lane| bits | self.bits(words[lane]) << lane))
+    pub fn shares(self, words: [&[u32]; LANES]) -> Vec4 {
+        if self.is_share() {
+            return Vec4::from_array(words.map(|words| self.share(words)));
+        }
+        let bits = (0..LANES).fold(0, |bits, lane| bits | self.bits(words[lane]) << lane);
+        Lanes::from_bits(bits).select(Vec4::ONE)
     }
 
     #[inline]

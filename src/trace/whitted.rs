@@ -1,18 +1,18 @@
 //! What leaves a surface towards the eye, and the rays that have to be followed to know it.
 
-use super::delta_lights::DeltaLights;
 use super::ggx::{environment_share, refract};
 use super::interaction::{Beam, SurfaceInteraction};
 use super::lanes::Lanes;
 use super::light::{Emitter, Unshadowed};
 use super::point::{Side, SurfacePoint};
+use super::punctual::PunctualLights;
 use super::receivers::{Brought, Receivers};
 use super::surface::Surface;
 use super::visibility::Inquiry;
 use super::{Radiance, Tracer};
 use crate::accel::{Ray, Sides};
 use crate::frame::{RayCounts, SurfaceSample};
-use glam::Vec3;
+use glam::{Vec3, Vec4};
 use std::f32::consts::FRAC_1_PI;
 
 /// A ray is followed only if it carries more than this share of what it finds to the pixel.
@@ -92,17 +92,17 @@ pub(super) struct Incoming {
 }
 
 impl Incoming {
-    /// Adds those of four lights without size that are `asked` for and `reach` the point, which is not asked of lights
-    /// that would bring nothing to the eye.
+    /// Adds those of four punctual lights that are `asked` for. `reach` says which share of each reaches the point; it is not asked
+    /// of lights that would bring nothing to the eye.
     #[inline]
     pub fn add_four(
         &mut self,
         it: &SurfaceInteraction,
         surface: &Surface,
         toward: Vec3,
-        lights: &DeltaLights,
+        lights: &PunctualLights,
         asked: Lanes,
-        reach: impl FnOnce(Lanes) -> Lanes,
+        reach: impl FnOnce(Lanes) -> Vec4,
     ) {
         let mut brought = Brought::default();
         let receivers = Receivers::all(it, surface, toward);
@@ -111,7 +111,7 @@ impl Incoming {
         self.highlights += receivers.highlights(&brought).sum();
     }
 
-    /// Adds the `share` of a light that has a size that reaches the point.
+    /// Adds the `share` of an area light that reaches the point.
     pub fn add(
         &mut self,
         it: &SurfaceInteraction,
@@ -289,11 +289,11 @@ impl Tracer<'_> {
                 Some(lit) => self.layout.lights[number].share(lit),
                 None => self.light_share(&point, number, inquiry, || path.count(rays)),
             };
-            for lights in &self.delta_lights {
-                let reach = |lanes: Lanes| lanes.filter(|lane| share(lights.number(lane)) > 0.0);
+            for lights in &self.punctual_lights {
+                let reach = |lanes: Lanes| lanes.replace(Vec4::ZERO, |lane| share(lights.number(lane)));
                 incoming.add_four(&it, surface, -direction, lights, Lanes::ALL, reach);
             }
-            for &number in &self.sized_lights {
+            for &number in &self.area_lights {
                 let light = &self.lights[number];
                 if let Some(unshadowed) = light.unshadowed(it.point.position, it.normal) {
                     let share = share(number);
