@@ -5,6 +5,7 @@ use super::around::{Trust, is_one_surface};
 use super::buzz_buffer::BuzzBuffer;
 use super::centre::{CastCentres, ENOUGH_TO_FILL};
 use super::lattice::{Lattice, Position};
+use super::moved::is_passed;
 use super::project::{AT_CENTRE, Landings};
 use super::projector::Projector;
 use super::subpixel::Samples;
@@ -38,6 +39,9 @@ impl<R: CastCentres> Source for Carried<'_, R> {
         let own = self.landed(slot.at);
         if let Some(own) = own.filter(|_| self.trust.is_none() || self.stands_still(slot.at)) {
             let (sample, lit) = self.old.get(own);
+            if self.is_passed(&sample) {
+                return false;
+            }
             *slot.sample = sample;
             slot.lit.copy_from_slice(lit);
             return true;
@@ -53,7 +57,7 @@ impl<R: CastCentres> Source for Carried<'_, R> {
             return false;
         }
         let Some(sample) = self.nearest(&around, slot.at) else { return false };
-        if self.may_be_hidden(&sample, &around, slot.at, pixels) {
+        if self.may_be_hidden(&sample, &around, slot.at, pixels) || self.is_passed(&sample) {
             return false;
         }
         *slot.sample = sample;
@@ -77,6 +81,11 @@ impl<R: CastCentres> Source for Carried<'_, R> {
 }
 
 impl<R: CastCentres> Carried<'_, R> {
+    /// True if a body may stand before a sample now. The pixel's mark does not say: what landed on its centre may be nearer.
+    fn is_passed(&self, sample: &SurfaceSample) -> bool {
+        self.rays.motion().is_some_and(|motion| is_passed(sample, self.view, motion))
+    }
+
     /// The number of the old sample that landed nearest to the eye.
     fn landed(&self, at: Position) -> Option<usize> {
         self.landings.source(at[1] as usize * self.old.lattice.size().0 + at[0] as usize)
@@ -111,8 +120,8 @@ impl<R: CastCentres> Carried<'_, R> {
         (is_one || is_one_surface(&met, &front, view)).then_some(met)
     }
 
-    /// True if a ray has met something at one of the four pixels between which a position lies that stands before the sample and
-    /// of which nothing landed around it: it has come into view since.
+    /// True if one of the four pixels between which a position lies shows something that stands before the sample and of which nothing
+    /// landed around it: it has come into view since.
     fn may_be_hidden(
         &self,
         sample: &SurfaceSample,
@@ -122,11 +131,8 @@ impl<R: CastCentres> Carried<'_, R> {
     ) -> bool {
         let is_unknown =
             |met: &SurfaceSample| !around.samples().any(|known| is_one_surface(&known, met, self.view));
-        pixels_between(self.old.lattice, at).any(|pixel| {
-            !pixels.class[pixel].is_reused()
-                && pixels.z[pixel] < self.view.depth(sample)
-                && is_unknown(&pixels.sample(pixel))
-        })
+        pixels_between(self.old.lattice, at)
+            .any(|pixel| pixels.z[pixel] < self.view.depth(sample) && is_unknown(&pixels.sample(pixel)))
     }
 
     /// Takes over the shadow bits on which those around agree that lie on the surface of the sample, if they are enough. The

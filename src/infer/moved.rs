@@ -96,13 +96,18 @@ pub(super) fn moved(
             return;
         }
         for (pixel, i) in landed {
-            let sample = now.sample(i);
-            let (from, direction, until) = view.line_to(&sample);
-            if entered.meet(&Shaft::Line(Line::new(from, direction, until)), motion.body_of(&sample)) {
+            if is_passed(&now.sample(i), view, motion) {
                 marks.set(pixel, PixelClass::Moved);
             }
         }
     });
+}
+
+/// True if a body may stand before a sample now.
+pub(super) fn is_passed(sample: &SurfaceSample, view: &Projector, motion: &dyn Motion) -> bool {
+    let (from, direction, until) = view.line_to(sample);
+    let line = Shaft::Line(Line::new(from, direction, until));
+    motion.bodies().entered.meet(&line, motion.body_of(sample))
 }
 
 /// The lights that have to be asked about a sample because of what has moved.

@@ -217,6 +217,39 @@ fn sub_pixels_show_what_has_just_come_in() {
     assert!(decibels.iter().all(|&db| db > 60.0), "{decibels:?}");
 }
 
+#[test]
+fn sub_pixels_between_bars_show_the_body_that_moves_behind_them() {
+    let mut set = Set::new();
+    set.wall(400.0, -20.0);
+    let bar = set.scene.add_mesh(Mesh::analytic(Shape::cuboid(DVec3::new(0.03, 3.0, 0.03)), set.blue));
+    for i in -20..20 {
+        let at = DVec3::new(0.07 * f64::from(i), 0.0, -3.0);
+        set.scene.add_instance(bar, DAffine3::from_translation(at));
+    }
+    set.ball(0.8, DVec3::ZERO);
+    let body = set.scene.instances.last().unwrap().node;
+    set.camera((0..8).map(|_| [0.0; 3]));
+    let places = (0..8u8).flat_map(|i| [0.15 * f32::from(i) - 0.5, 0.0, -6.0]);
+    set.animate(Target::Translation(body), 3, places.collect());
+    let decibels = set.decibels(Quality::Centred, 3);
+    assert!(decibels.iter().all(|&db| db > 100.0), "{decibels:?}");
+}
+
+#[test]
+fn sub_pixels_show_what_the_far_plane_no_longer_cuts_off() {
+    let mut set = Set::new();
+    set.put(Mesh::plane(200.0, set.red), DAffine3::IDENTITY);
+    let camera = set.camera((0..9u8).map(f32::from).map(|i| [0.187 * i, 2.0 + 0.082 * i, -0.284 * i]));
+    let node = set.scene.cameras[camera].node;
+    let turns =
+        (0..9u8).flat_map(|i| DQuat::from_rotation_x(-0.2 + 0.016 * f64::from(i)).as_quat().to_array());
+    set.animate(Target::Rotation(node), 4, turns.collect());
+    set.scene.cameras[camera].lens.far = 12.0;
+    set.scene.cameras[camera].lens.projection = Projection::Perspective { yfov: 0.97 };
+    let decibels = set.decibels(Quality::Centred, 2);
+    assert!(decibels.iter().all(|&db| db > 60.0), "{decibels:?}");
+}
+
 /// Balls and mirrored cards on a floor.
 fn things(set: &mut Set) {
     let floor = Mesh::plane(30.0, set.blue);
