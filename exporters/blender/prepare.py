@@ -14,6 +14,8 @@ from .nodes import drop_muted, trees
 
 # (viewport, render) pairs of properties that modifiers, curves, metaballs and particle settings have.
 _LEVELS = (("levels", "render_levels"), ("screw_steps", "render_steps"), ("steps", "render_steps"), ("viewport_resolution", "resolution"))
+# Modifiers of what simulations of other objects meet.
+_MET = {"COLLISION", "FLUID", "DYNAMIC_PAINT"}
 
 
 def prepare(scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer) -> None:
@@ -32,13 +34,12 @@ def prepare(scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer) -> None:
         scene.render.simplify_subdivision = scene.render.simplify_subdivision_render
         scene.render.simplify_child_particles = scene.render.simplify_child_particles_render
     for collection in bpy.data.collections:
-        if not collection.library:
-            collection.hide_viewport = False
+        collection.hide_viewport = collection.hide_render
     _show_layers(view_layer.layer_collection)
+    _keep_unseen(scene, view_layer)
     for ob in bpy.data.objects:
         _still(ob, "hide_viewport")
-        # Hidden objects may be shown by something else, but a hidden instance of a collection is never one.
-        ob.hide_viewport = ob.instance_type == "COLLECTION" and ob.hide_render and not _moves(ob, "hide_render")
+        ob.hide_viewport = ob.hide_render and not stays(ob)
         ob.show_instancer_for_viewport = ob.show_instancer_for_render
         for modifier in ob.modifiers:
             _as_rendered(ob, modifier)
@@ -72,6 +73,28 @@ def _show_layers(layer: bpy.types.LayerCollection) -> None:
     layer.hide_viewport = False
     for child in layer.children:
         _show_layers(child)
+
+
+def _keep_unseen(scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer) -> None:
+    """Have evaluated what is needed though its collections are hidden: what simulations meet, and cameras, as any may be asked for."""
+    shown = rendered_objects(view_layer)
+    unseen = [ob for ob in view_layer.objects if ob.name_full not in shown and (ob.type == "CAMERA" or _is_met(ob))]
+    if unseen:
+        kept = bpy.data.collections.new("Unseen")
+        scene.collection.children.link(kept)
+        kept.hide_render = True
+        for ob in unseen:
+            kept.objects.link(ob)
+
+
+def stays(ob: bpy.types.Object) -> bool:
+    """Whether an object is evaluated also while it is hidden: it moves on and appears again, or simulations meet it."""
+    return _moves(ob, "hide_render") or _is_met(ob)
+
+
+def _is_met(ob: bpy.types.Object) -> bool:
+    """Whether an object has a part in simulations of others, which Blender makes of what the viewport has."""
+    return ob.rigid_body is not None or (ob.field is not None and ob.field.type != "NONE") or any(m.type in _MET for m in ob.modifiers)
 
 
 def _is_render(tree: bpy.types.NodeTree) -> None:

@@ -18,7 +18,7 @@ from ..common.report import Lost
 from .cameras import CameraTrack, find_cameras
 from .geometry import GeometryStore
 from .lights import LightTrack
-from .prepare import rendered_objects
+from .prepare import rendered_objects, stays
 
 _NOT_MESHES = {
     "VOLUME": "volume",
@@ -57,11 +57,12 @@ class Sampler:
         self.lights: dict[Key, LightTrack] = {}
         self.cameras = [CameraTrack(ob) for ob in find_cameras(scene, view_layer)]
         self.geometry = GeometryStore(lost)
+        # All else that a render does not show is not in the graph, see prepare.py.
+        self._staying = {ob.name_full for ob in bpy.data.objects if stays(ob)}
         self._hidden = {ob.name_full for ob in view_layer.objects} - rendered_objects(view_layer)
         # Frame of each sample in the order in which they were taken (`frames` is put in order of time at the end).
         self.taken: list[float] = []
         self.on_sample: Callable[[], None] = lambda: None
-        self._members: dict[str, set[str]] = {}
 
     def run(self, first: int, last: int) -> None:
         """Sample every whole frame, then between frames where something moves too fast for straight lines."""
@@ -140,6 +141,9 @@ class Sampler:
         """Whether a hidden object may appear later (its visibility is animated)."""
         return ob.original.animation_data is not None
 
+    def _is_shown(self, ob: bpy.types.Object) -> bool:
+        return not ob.hide_render and ob.original.name_full not in self._hidden
+
     def _walk(self, depsgraph: bpy.types.Depsgraph) -> Iterator[tuple[Key, bpy.types.DepsgraphObjectInstance, bool]]:
         """Geometry and lights with a key that is the same at every frame, and whether a render shows them."""
         for instance in depsgraph.object_instances:
@@ -149,30 +153,19 @@ class Sampler:
             if instance.is_instance:
                 parent = instance.parent
                 key = (parent.name_full, ob.name_full, ob.data.name, *instance.persistent_id)
-                visible = parent.original.name_full not in self._hidden and not parent.hide_render
+                visible = self._is_shown(parent) and not _is_copied_by_parent(parent)
                 # Particles and geometry nodes show objects that are themselves hidden; collections and faces do not.
                 own = ob.original.name_full != parent.original.name_full and instance.particle_system is None
                 if own and parent.original.instance_type != "NONE":
-                    visible = visible and not ob.hide_render and self._is_member(parent, ob)
+                    visible = visible and not (ob.hide_render and ob.original.name_full in self._staying)
             else:
                 key = (ob.name_full,)
-                visible = instance.show_self and not ob.hide_render and ob.original.name_full not in self._hidden
-                visible = visible and not _is_copied_by_parent(ob)
+                visible = instance.show_self and self._is_shown(ob) and not _is_copied_by_parent(ob)
             if ob.type not in _NOT_MESHES:
                 yield key, instance, visible
             elif visible and _is_something(ob):
                 way = "Volume to Mesh modifier" if ob.type == "VOLUME" else "Object > Convert"
                 self.lost.add(ob.name, _NOT_MESHES[ob.type], f"it is left out; convert it to a mesh first ({way})")
-
-    def _is_member(self, parent: bpy.types.Object, ob: bpy.types.Object) -> bool:
-        """Whether a collection instancer renders an object of its collection (nested hidden collections do not)."""
-        collection = parent.original.instance_collection
-        if parent.original.instance_type != "COLLECTION" or collection is None:
-            return True
-        if collection.name_full not in self._members:
-            everything = {o.name_full for o in collection.all_objects}
-            self._members[collection.name_full] = everything - _members(collection)
-        return ob.original.name_full not in self._members[collection.name_full]
 
 
 def _is_portal(ob: bpy.types.Object) -> bool:
@@ -189,12 +182,3 @@ def _is_copied_by_parent(ob: bpy.types.Object) -> bool:
 def _is_something(ob: bpy.types.Object) -> bool:
     """Whether hair or a point cloud has points: geometry nodes may have made a mesh of them."""
     return ob.type not in ("CURVES", "POINTCLOUD") or len(ob.data.points) > 0
-
-
-def _members(collection: bpy.types.Collection) -> set[str]:
-    """Names of the objects of a collection whose collections are all rendered."""
-    names = {ob.name_full for ob in collection.objects}
-    for child in collection.children:
-        if not child.hide_render:
-            names |= _members(child)
-    return names
