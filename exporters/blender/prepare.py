@@ -162,16 +162,27 @@ def rendered_objects(view_layer: bpy.types.ViewLayer) -> set[str]:
 
 
 def action_curves(owner: bpy.types.ID) -> list[bpy.types.FCurve]:
-    """The F-curves of a datablock's action, in the old (4.x) and the slotted (5.x) form."""
+    """The F-curves of a datablock: of its action and of those in its NLA strips."""
     data = owner.animation_data
-    action = data.action if data else None
+    if data is None:
+        return []
+    strips = [strip for track in data.nla_tracks for strip in track.strips]
+    for strip in strips:
+        # A meta strip holds others.
+        strips += strip.strips
+    return [curve for holder in (data, *strips) for curve in _curves(holder)]
+
+
+def _curves(holder: bpy.types.AnimData | bpy.types.NlaStrip) -> list[bpy.types.FCurve]:
+    """The F-curves of an action in use, in the old (4.x) and the slotted (5.x) form."""
+    action = holder.action
     if action is None:
         return []
     if hasattr(action, "fcurves"):
         return list(action.fcurves)
     from bpy_extras.anim_utils import action_get_channelbag_for_slot
 
-    bag = action_get_channelbag_for_slot(action, data.action_slot)
+    bag = action_get_channelbag_for_slot(action, holder.action_slot)
     return list(bag.fcurves) if bag else []
 
 

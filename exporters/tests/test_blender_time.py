@@ -203,3 +203,37 @@ def test_a_modifier_is_on_when_the_render_has_it_on(blender, export):
     nodes = [i for i, n in enumerate(gltf.root["nodes"]) if n["name"] == "Two"]
     faces = [sum(len(gltf.triangles(n)) for n in nodes if gltf.visible(n, f)) for f in range(1, 5)]
     assert faces == [192, 192, 384, 384]
+
+
+def push_down(ob):
+    """Move an object's action into an NLA strip."""
+    data = ob.animation_data
+    data.nla_tracks.new().strips.new("Strip", 1, data.action)
+    data.action = None
+
+
+def test_switches_in_nla_strips(blender, export):
+    import blender_scene as b
+
+    scene = blender.context.scene
+    scene.frame_end = 3
+    b.camera()
+    proxy = b.cube("Proxy")
+    b.key(proxy, "hide_viewport", {1: True, 3: True})
+    more = b.plane("More")
+    b.key(more.modifiers.new("Array", "ARRAY"), "show_render", {1: False, 2: True}, interpolation="CONSTANT")
+    source = blender.data.collections.new("Source")
+    leaf = b.cube("Leaf")
+    scene.collection.objects.unlink(leaf)
+    source.objects.link(leaf)
+    empty = b.link(blender.data.objects.new("Instance", None))
+    empty.instance_type, empty.instance_collection = "COLLECTION", source
+    b.key(empty, "hide_render", {1: True, 2: False}, interpolation="CONSTANT")
+    for ob in (proxy, more, empty):
+        push_down(ob)
+    scene.frame_set(1)
+    gltf = export()
+    nodes = [i for i, n in enumerate(gltf.root["nodes"]) if n["name"] == "More"]
+    assert [sum(len(gltf.triangles(n)) for n in nodes if gltf.visible(n, f)) for f in (1, 2, 3)] == [2, 4, 4]
+    assert [gltf.visible(gltf.node("Leaf"), f) for f in (1, 2, 3)] == [False, True, True]
+    assert all(gltf.visible(gltf.node("Proxy"), f) for f in (1, 2, 3))
