@@ -5,7 +5,11 @@ So the open file, its selection and its mode are never touched, and Blender stay
 
 from __future__ import annotations
 
+import os
+import shutil
 import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import bpy
@@ -73,6 +77,41 @@ def _preferred_converter() -> str:
     return bpy.path.abspath(addon.preferences.converter) if addon and addon.preferences else ""
 
 
+def _save_copy(folder: Path) -> Path:
+    """Save a copy of the open file, with all that it reads."""
+    file = Path(bpy.data.filepath)
+    copy = folder / (file.name or "untitled.blend")
+    with _absolute_bakes():
+        # copy=True leaves the open file's name and its unsaved state as they are; relative paths are remapped in the copy.
+        bpy.ops.wm.save_as_mainfile(filepath=str(copy), copy=True, relative_remap=True, compress=False)
+    # Blender looks for disk caches beside the file only.
+    caches = file.parent / f"blendcache_{file.stem}"
+    if file.name and caches.is_dir():
+        try:
+            # Links to the files, not to the folder: what was not baked is deleted and made anew, and stays beside the open file.
+            shutil.copytree(caches, folder / caches.name, copy_function=os.symlink)
+        except OSError:
+            # Windows lets not everybody make links.
+            shutil.copytree(caches, folder / caches.name, dirs_exist_ok=True)
+    return copy
+
+
+@contextmanager
+def _absolute_bakes() -> Iterator[None]:
+    """Folders of geometry nodes' bakes, which Blender does not remap, are absolute for as long as a copy is saved."""
+    nodes = [m for ob in bpy.data.objects if not ob.library for m in ob.modifiers if m.type == "NODES"]
+    kept = [(m, "bake_directory", m.bake_directory) for m in nodes]
+    kept += [(bake, "directory", bake.directory) for m in nodes for bake in m.bakes]
+    relative = [each for each in kept if each[2].startswith("//")]
+    for owner, name, path in relative:
+        setattr(owner, name, bpy.path.abspath(path))
+    try:
+        yield
+    finally:
+        for owner, name, path in relative:
+            setattr(owner, name, path)
+
+
 class _Runner:
     """What the operators share: a copy of the file, a task, a timer."""
 
@@ -87,9 +126,7 @@ class _Runner:
             return {"CANCELLED"}
         settings = context.scene.buzz
         self._convert_to, self._folder = convert_to, tempfile.TemporaryDirectory(prefix="buzz-")
-        copy = Path(self._folder.name) / (Path(bpy.data.filepath).name or "untitled.blend")
-        # copy=True leaves the open file's name and its unsaved state as they are; relative paths are remapped in the copy.
-        bpy.ops.wm.save_as_mainfile(filepath=str(copy), copy=True, relative_remap=True, compress=False)
+        copy = _save_copy(Path(self._folder.name))
         # What Blender would not run here, it does not run there; the copy is not in the user's trusted folders.
         trusted = not bpy.app.autoexec_fail
         steps = [("exporting", background.export_command(bpy.app.binary_path, copy, output, self._options(context.scene, settings), trusted))]
@@ -104,7 +141,9 @@ class _Runner:
             if context.scene.render.film_transparent:
                 command.append("--transparent")
             steps.append(("rendering", command))
-        State.task = background.Task(steps)
+        images = [image.name for image in bpy.data.images if image.is_dirty and image.source != "VIEWER"]
+        unsaved = [f"{name}: image that is painted but not saved: it is as it was before; save or pack it" for name in images]
+        State.task = background.Task(steps, warnings=unsaved)
         if bpy.app.background:
             State.task.wait(print)
             return self._finish(context)

@@ -105,6 +105,57 @@ def test_export_and_convert_loads_the_sequence(blender, shot, buzz, tmp_path, mo
     assert (node.frame_start, node.frame_duration, node.frame_offset) == (1, 3, 0)
 
 
+def test_disk_caches_come_along(blender, shot, tmp_path):
+    import blender_scene as b
+    from gltf_reader import Gltf
+
+    ob = b.plane("Cloth", size=2)
+    cache = ob.modifiers.new("Cloth", "CLOTH").point_cache
+    cache.frame_start, cache.frame_end, cache.use_disk_cache = 1, 3, True
+    with blender.context.temp_override(active_object=ob, object=ob, point_cache=cache):
+        blender.ops.ptcache.bake(bake=True)
+    blender.ops.wm.save_mainfile()
+    blender.ops.export_scene.buzz_gltf(filepath=str(tmp_path / "o" / "anim.gltf"))
+    gltf = Gltf(tmp_path / "o" / "anim.gltf")
+    assert gltf.posed_points(gltf.node("Cloth"), 3)[:, 1].max() < -0.01, "it falls"
+    assert list((tmp_path / "blendcache_shot").iterdir()), "they stay where they are"
+
+
+def test_caches_that_are_not_baked_are_left_alone(blender, shot, tmp_path):
+    """The export's levels are the render's, so that it cannot use them and makes its own."""
+    import blender_scene as b
+
+    ob = b.plane("Cloth", size=2)
+    ob.modifiers.new("Subdivision", "SUBSURF").render_levels = 2
+    cache = ob.modifiers.new("Cloth", "CLOTH").point_cache
+    cache.frame_start, cache.frame_end, cache.use_disk_cache = 1, 3, True
+    for frame in (1, 2, 3):
+        b.set_frame(frame)
+    blender.ops.wm.save_mainfile()
+    before = {path: path.read_bytes() for path in (tmp_path / "blendcache_shot").iterdir()}
+    blender.ops.export_scene.buzz_gltf(filepath=str(tmp_path / "o" / "anim.gltf"))
+    assert before
+    assert {path: path.read_bytes() for path in (tmp_path / "blendcache_shot").iterdir()} == before
+
+
+def test_folders_of_bakes_are_found_from_the_copy(blender, extension, shot, tmp_path):
+    nodes = blender.data.objects["Chosen"].modifiers.new("Nodes", "NODES")
+    nodes.bake_directory = "//bakes"
+    before = state(blender)
+    (tmp_path / "copy").mkdir()
+    copy = importlib.import_module("buzz_gltf_test.blender.ui")._save_copy(tmp_path / "copy")
+    assert (nodes.bake_directory, state(blender)) == ("//bakes", before)
+    blender.ops.wm.open_mainfile(filepath=str(copy))
+    assert Path(blender.data.objects["Chosen"].modifiers["Nodes"].bake_directory) == tmp_path / "bakes"
+
+
+def test_images_that_are_not_saved_are_named(blender, shot, tmp_path, capfd):
+    image = blender.data.images.new("Paint", 4, 4)
+    image.pixels[0] = 0.5
+    assert blender.ops.export_scene.buzz_gltf(filepath=str(tmp_path / "o" / "anim.gltf")) == {"FINISHED"}
+    assert "Paint: image that is painted but not saved" in capfd.readouterr().out
+
+
 def test_missing_converter_is_one_clear_error(blender, shot, tmp_path, monkeypatch):
     monkeypatch.setenv("BUZZ_CONVERT", "")
     monkeypatch.setenv("PATH", str(tmp_path))
