@@ -72,7 +72,8 @@ class GeometryStore:
     def shape_of(self, ob: bpy.types.Object, sample: int) -> int:
         """The shape of an evaluated object at a sample; its pose is recorded where it may change."""
         pointer = ob.data.as_pointer()
-        if pointer in self._this_sample and not _slots_of_object(ob):
+        own_slots = _slots_of_object(ob)
+        if pointer in self._this_sample and not own_slots:
             return self._this_sample[pointer]
         source = (ob.original.name_full, ob.data.name)
         meshes = self._meshes_of.setdefault(source, [])
@@ -97,7 +98,8 @@ class GeometryStore:
                 self._by_source.setdefault(source, []).append(number)
             self.shapes[number].take_pose(sample, _positions(ob.data))
             self._name_what_changes(ob, number)
-        self._this_sample[pointer] = number
+        if not own_slots:
+            self._this_sample[pointer] = number
         return number
 
     def _name_what_changes(self, ob: bpy.types.Object, number: int) -> None:

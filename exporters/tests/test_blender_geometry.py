@@ -330,7 +330,8 @@ def test_mixed_shaders_are_named(blender, export):
     assert export().lost_features("Grey") == ["Mix Shader shader"]
 
 
-def test_materials_of_slots_of_the_object(blender, export):
+@pytest.mark.parametrize("own", ["A", "B"])
+def test_materials_of_slots_of_the_object(blender, export, own):
     import blender_scene as b
 
     b.camera()
@@ -339,13 +340,14 @@ def test_materials_of_slots_of_the_object(blender, export):
     a.data.materials.append(first)
     other = b.link(blender.data.objects.new("B", a.data))
     other.location = (3, 0, 0)
-    other.material_slots[0].link, other.material_slots[0].material = "OBJECT", second
+    slot = blender.data.objects[own].material_slots[0]
+    slot.link, slot.material = "OBJECT", second
     gltf = export()
     used = {}
     for name in ("A", "B"):
         mesh = gltf.root["meshes"][gltf.root["nodes"][gltf.node(name)]["mesh"]]
         used[name] = gltf.root["materials"][mesh["primitives"][0]["material"]]["name"]
-    assert used == {"A": "Red", "B": "Blue"}
+    assert used == {"A": "Red", "B": "Red", own: "Blue"}
 
 
 def test_what_has_no_material_is_as_in_blender(blender, export):
