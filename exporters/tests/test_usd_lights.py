@@ -80,6 +80,30 @@ def test_temperature_and_cone(usd_convert):
     assert data["spot"]["innerConeAngle"] == pytest.approx(math.radians(15))
 
 
+@pytest.mark.parametrize("angles", [(30.0, 90.0), (120.0, 30.0)])
+def test_cones_that_open_wide(usd_convert, angles):
+    made = u.stage()
+    u.camera(made)
+    cone = UsdLux.ShapingAPI.Apply(light(made, "SphereLight")).CreateShapingConeAngleAttr()
+    for frame, angle in zip((1, 5), angles, strict=True):
+        cone.Set(angle, frame)
+    gltf = usd_convert(made)
+    want = [min(math.radians(angle), math.pi / 2) for angle in angles]
+    data = gltf.light("Light")[1]
+    assert (data["type"], data["spot"]["outerConeAngle"]) == ("spot", pytest.approx(want[0], abs=1e-6))
+    assert [gltf.light_value("Light", "spot/outerConeAngle", f, 0.0) for f in (1, 5)] == pytest.approx(want, abs=1e-6)
+    assert gltf.lost_features("/World/Light") == ["cone that opens to 90 degrees and more"]
+
+
+def test_cones_of_all_directions_are_none(usd_convert):
+    made = u.stage()
+    u.camera(made)
+    UsdLux.ShapingAPI.Apply(light(made, "SphereLight")).CreateShapingConeAngleAttr(90.0)
+    gltf = usd_convert(made)
+    assert gltf.light("Light")[1]["type"] == "point"
+    assert not gltf.lost_features("/World/Light")
+
+
 def test_animated_and_hidden(usd_convert):
     made = u.stage()
     u.camera(made)

@@ -30,6 +30,8 @@ _ROUND = {"SphereLight": slice(0, 3), "CylinderLight": slice(1, 3)}
 _HALF_PI = math.pi / 2
 # A sun all over the sky; seven digits, as it is written, that are not above pi.
 _WIDEST = 3.141592
+# A cone of half the sky, likewise.
+_WIDEST_CONE = 1.570796
 # Beyond it single precision, which glTF has, soon ends.
 _BRIGHTEST = 1e30
 
@@ -81,7 +83,11 @@ class LightTrack:
             lost.add(path, "round light that is scaled unevenly", "it stays round; scale it evenly, or use a disk light")
         values = {k: np.array([v[k] for v in self.values]) for k in self.values[0]}
         first = self.values[0]
-        spot = "outer" in first
+        wide = values.get("outer", np.full(1, _HALF_PI)) > _WIDEST_CONE
+        spot = not wide.all()
+        if spot and wide.any():
+            lost.add(path, "cone that opens to 90 degrees and more", "it shines over half of the sky while it does; use a light without a cone for that time")
+            values["outer"] = np.minimum(values["outer"], _WIDEST_CONE)
         light: dict[str, Any] = {
             "name": self.prim.GetName(),
             "type": "directional" if kind == "DistantLight" else "spot" if spot or "width" in first else "point",
@@ -96,7 +102,7 @@ class LightTrack:
             }
             light["spot"] = {"innerConeAngle": 0, "outerConeAngle": _HALF_PI}
         elif spot:
-            light["spot"] = {"innerConeAngle": float(first["inner"]), "outerConeAngle": float(first["outer"])}
+            light["spot"] = {"innerConeAngle": float(first["inner"]), "outerConeAngle": float(values["outer"][0])}
         for key in ("radius", "angle"):
             if key in first:
                 light["extras"][key] = tidy(first[key])
@@ -176,8 +182,8 @@ def _values(prim: Usd.Prim, time: Usd.TimeCode, scale: np.ndarray, units: float)
         factor = disc / (4 * disc / units**2 if normalize else 1)
         out["radius"] = 0.0 if _get(prim, "treatAsPoint", time, False) else radius
     cone = float(_get(prim, "inputs:shaping:cone:angle", time, 90.0))
-    if prim.HasAPI(UsdLux.ShapingAPI) and cone < 90 and kind == "SphereLight":
-        outer = math.radians(max(cone, 0.1))
+    if prim.HasAPI(UsdLux.ShapingAPI) and kind == "SphereLight":
+        outer = math.radians(min(90.0, max(cone, 0.1)))
         soft = min(max(float(_get(prim, "inputs:shaping:cone:softness", time, 0.0)), 0.0), 1.0)
         out |= {"outer": outer, "inner": max(min(outer * (1 - soft), outer - 1e-4), 0.0)}
     total = light * factor * LUMENS_PER_WATT
