@@ -7,6 +7,7 @@ geometry-nodes instances and particles are all resolved there, so none of them n
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 
@@ -146,6 +147,7 @@ class Sampler:
 
     def _walk(self, depsgraph: bpy.types.Depsgraph) -> Iterator[tuple[Key, bpy.types.DepsgraphObjectInstance, bool]]:
         """Geometry and lights with a key that is the same at every frame, and whether a render shows them."""
+        met: Counter[Key] = Counter()
         for instance in depsgraph.object_instances:
             ob = instance.object
             if ob.type not in ("MESH", "LIGHT", *_NOT_MESHES) or _is_portal(ob):
@@ -162,7 +164,9 @@ class Sampler:
                 key = (ob.name_full,)
                 visible = instance.show_self and self._is_shown(ob) and not _is_copied_by_parent(ob)
             if ob.type not in _NOT_MESHES:
-                yield key, instance, visible
+                # Where vertices and faces instance each other three deep, numbers of Blender's repeat.
+                met[key] += 1
+                yield (*key, met[key]), instance, visible
             elif visible and _is_something(ob):
                 way = "Volume to Mesh modifier" if ob.type == "VOLUME" else "Object > Convert"
                 self.lost.add(ob.name, _NOT_MESHES[ob.type], f"it is left out; convert it to a mesh first ({way})")

@@ -229,6 +229,28 @@ def test_geometry_nodes_instances(blender, export):
     assert all(len(gltf.triangles(n)) == 20 for n in nodes)
 
 
+def test_instances_on_parts_of_instances(blender, export):
+    """Three deep, where several instances have the same persistent_id."""
+    import blender_scene as b
+
+    b.camera()
+    parent = None
+    for depth, kind in enumerate(("VERTS", "FACES", "VERTS")):
+        ob = b.plane(f"Level.{depth}", size=4 / (depth + 1))
+        ob.parent, ob.instance_type = parent, kind
+        parent = ob
+    b.cube("Stone", size=0.2).parent = parent
+    gltf = export()
+    nodes = [i for i, n in enumerate(gltf.root["nodes"]) if n["name"] == "Stone" and gltf.visible(i, 2)]
+    places, numbers = [], []
+    for made in b.set_frame(2).object_instances:
+        if made.object.name == "Stone" and made.parent is not None and made.parent.name == "Level.0":
+            places.append(b.YUP[:3, :3] @ np.array(made.matrix_world.translation, dtype=float))
+            numbers.append(tuple(made.persistent_id))
+    assert len(set(numbers)) < len(numbers)
+    assert sorted(np.round(places, 3).tolist()) == sorted(np.round(gltf.world(n, 2)[:3, 3], 3).tolist() for n in nodes)
+
+
 def test_metaballs_text_and_bevelled_curves_are_meshes(blender, export):
     import blender_scene as b
 
