@@ -105,6 +105,20 @@ def test_range_from_samples(usd_convert):
     assert (gltf.buzz["frame_start"], gltf.buzz["frame_end"]) == (10, 20)
 
 
+def test_range_from_samples_in_instances(usd_convert):
+    made = u.stage(frames=None)
+    u.camera(made)
+    made.CreateClassPrim("/Model")
+    moved = UsdGeom.XformCommonAPI(u.cube(made, "/Model/Part"))
+    for frame in (10, 20):
+        moved.SetTranslate((frame, 0, 0), frame)
+    prim = made.DefinePrim("/World/Instance", "Xform")
+    prim.GetReferences().AddInternalReference("/Model")
+    prim.SetInstanceable(True)
+    gltf = usd_convert(made)
+    assert (gltf.buzz["frame_start"], gltf.buzz["frame_end"]) == (10, 20)
+
+
 def test_range_from_splines(usd_convert):
     from pxr import Ts
 

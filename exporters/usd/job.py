@@ -148,7 +148,9 @@ class _Conversion:
     def _range(self) -> tuple[int, int]:
         times = [self.stage.GetStartTimeCode(), self.stage.GetEndTimeCode()]
         if not self.stage.HasAuthoredTimeCodeRange():
-            attributes = [a for prim in Usd.PrimRange.Stage(self.stage) for a in prim.GetAuthoredAttributes()]
+            # What is in instances is in their prototypes, once.
+            roots = [self.stage.GetPseudoRoot(), *self.stage.GetPrototypes()]
+            attributes = [a for root in roots for prim in Usd.PrimRange(root) for a in prim.GetAuthoredAttributes()]
             times = [t for a in attributes for t in (a.GetSpline().GetKnots().keys() if a.HasSpline() else a.GetTimeSamples())]
         if not all(math.isfinite(t) for t in times):
             raise InputError(f"{self.source}: its time codes are no numbers; pass --frames FIRST-LAST")
