@@ -165,6 +165,10 @@ def may_deform(ob: bpy.types.Object) -> bool:
         return True
     if source.type == "META" or is_animated(data) or getattr(data, "shape_keys", None) is not None:
         return True
+    handlers = bpy.app.handlers
+    # The words of a text cannot be animated: counters are written by Python.
+    if source.type == "FONT" and (handlers.frame_change_pre or handlers.frame_change_post):
+        return True
     return any(getattr(data, other, None) is not None for other in _SHAPED_BY)
 
 

@@ -272,6 +272,26 @@ def test_metaballs_text_and_bevelled_curves_are_meshes(blender, export):
         assert len(gltf.triangles(gltf.node(name))) > 20, name
 
 
+def test_texts_that_count_frames(blender, export):
+    import blender_scene as b
+
+    blender.context.scene.frame_end = 3
+    b.camera()
+    b.link(blender.data.objects.new("Counter", blender.data.curves.new("Counter", "FONT")))
+
+    def count(scene, _=None):
+        blender.data.curves["Counter"].body = "1" * scene.frame_current
+
+    blender.app.handlers.frame_change_pre.append(count)
+    try:
+        gltf = export()
+    finally:
+        blender.app.handlers.frame_change_pre.remove(count)
+    nodes = [i for i, n in enumerate(gltf.root["nodes"]) if n["name"] == "Counter"]
+    faces = [sum(len(gltf.triangles(n)) for n in nodes if gltf.visible(n, f)) for f in (1, 2, 3)]
+    assert faces == [faces[0], 2 * faces[0], 3 * faces[0]]
+
+
 def test_volumes_and_wires_are_named(blender, export):
     import blender_scene as b
 
