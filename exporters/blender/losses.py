@@ -62,10 +62,22 @@ def _strips(editor: bpy.types.SequenceEditor) -> bool:
 
 
 def name_scripts(lost: Lost) -> None:
-    """Drivers and scripts that Blender was not allowed to run; it knows once they would have."""
+    """Drivers and scripts that Blender was not allowed to run, or that fail; it knows once they would have."""
     if bpy.app.autoexec_fail:
         what = f"Python that was not allowed to run ({bpy.app.autoexec_fail_message})"
         lost.add(Path(bpy.data.filepath).name, what, "what it moves rests; if you trust the file, allow it (blender --enable-autoexec, export.py --scripts)")
+        return
+    for item in bpy.data.user_map():
+        for owner in (item, getattr(item, "node_tree", None)):
+            data = getattr(owner, "animation_data", None)
+            failing = dict.fromkeys(curve.data_path for curve in data.drivers if not curve.driver.is_valid) if data else {}
+            if failing:
+                what = f"drivers that fail: {_shortened(list(failing))}"
+                lost.add(item.name, what, "what they drive rests; mend them (functions of add-ons may not be there), or bake it to keys")
+
+
+def _shortened(names: list[str]) -> str:
+    return ", ".join(names[:5]) + (f" and {len(names) - 5} more" if len(names) > 5 else "")
 
 
 def _name_missing_data(lost: Lost) -> None:
@@ -75,7 +87,7 @@ def _name_missing_data(lost: Lost) -> None:
         if item.is_missing and item.library is not None and not isinstance(item, bpy.types.Library):
             missing.setdefault(item.library.filepath, []).append(item.name)
     for path, names in missing.items():
-        shown = ", ".join(sorted(names)[:5]) + (f" and {len(names) - 5} more" if len(names) > 5 else "")
+        shown = _shortened(sorted(names))
         lost.add(path, f"missing library data: {shown}", "it is left out; find it with File > External Data > Find Missing Files, or link it anew")
 
 

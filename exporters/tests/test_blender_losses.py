@@ -107,3 +107,20 @@ def test_python_that_was_not_run_is_named(blender, tmp_path):
         assert ("warning: shot.blend: Python that was not allowed to run" in done.stderr) == (not options)
         gltf = Gltf(tmp_path / "anim.gltf")
         assert gltf.world(gltf.node("Cube"), 1)[0, 3] == place
+
+
+def test_drivers_that_fail_are_named(blender, export, monkeypatch):
+    import blender_scene as b
+
+    b.camera()
+    ob, other = b.cube("Lifted"), b.cube("Turned")
+    made, _ = b.material("Glowing")
+    ob.data.materials.append(made)
+    monkeypatch.setattr(blender.context.preferences.filepaths, "use_scripts_auto_execute", True)
+    ob.driver_add("location", 2).driver.expression = "no_such_function(frame)"
+    other.driver_add("location", 2).driver.expression = "frame * 2"
+    made.node_tree.driver_add('nodes["Principled BSDF"].inputs["Metallic"].default_value').driver.variables.new()
+    gltf = export()
+    assert gltf.lost_features("Lifted") == ["drivers that fail: location"]
+    assert gltf.lost_features("Turned") == []
+    assert [f for f in gltf.lost_features("Glowing") if "driver" in f] == ['drivers that fail: nodes["Principled BSDF"].inputs["Metallic"].default_value']
