@@ -57,8 +57,10 @@ def name_scene_losses(scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer, l
 
 
 def _strips(editor: bpy.types.SequenceEditor) -> bool:
+    """Whether strips are rendered in place of the scene, as Blender decides it."""
     # Called otherwise before Blender 5.0.
-    return len(editor.strips_all if hasattr(editor, "strips_all") else editor.sequences_all) > 0
+    strips = editor.strips if hasattr(editor, "strips") else editor.sequences
+    return any(s.type != "SOUND" and not s.mute and not editor.channels[s.channel].mute for s in strips)
 
 
 def name_scripts(lost: Lost) -> None:

@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import wave
+
+import pytest
+
 
 def test_film_layers_and_shadows(blender, export):
     import blender_scene as b
@@ -71,6 +75,24 @@ def test_what_else_a_render_would_show_is_named(blender, export):
     gltf = export()
     assert {"Freestyle lines", "video sequencer"} <= set(gltf.lost_features("Scene"))
     assert (gltf.lost_features("Back"), gltf.lost_features("Off")) == (["further view layer"], [])
+
+
+@pytest.mark.parametrize("kind", ["sound", "muted", "channel", "shown"])
+def test_only_strips_that_are_rendered_are_named(blender, export, tmp_path, kind):
+    import blender_scene as b
+
+    b.camera()
+    editor = blender.context.scene.sequence_editor_create()
+    strips = editor.strips if hasattr(editor, "strips") else editor.sequences
+    if kind == "sound":
+        with wave.open(str(tmp_path / "a.wav"), "wb") as file:
+            file.setparams((1, 2, 8000, 0, "NONE", ""))
+            file.writeframes(bytes(16000))
+        strips.new_sound("Music", str(tmp_path / "a.wav"), 1, 1)
+    else:
+        strips.new_effect("Fade", "COLOR", 2, 1, **({"length": 3} if blender.app.version >= (5, 0, 0) else {"frame_end": 3})).mute = kind == "muted"
+        editor.channels[2].mute = kind == "channel"
+    assert ("video sequencer" in export().lost_features("Scene")) == (kind == "shown")
 
 
 def test_what_a_library_has_no_more_is_named(blender, export, tmp_path):
