@@ -150,3 +150,15 @@ def test_skeletons_that_do_not_exist_are_named(usd_convert):
     model(made, "/World/Actor")
     UsdSkel.BindingAPI(made.GetPrimAtPath("/World/Actor/Model/Card")).GetSkeletonRel().SetTargets(["/World/Gone"])
     assert any("/World/Gone" in f for f in usd_convert(made).lost_features("/World/Actor/Model/Card"))
+
+
+def test_skinned_meshes_outside_of_a_root_are_named(usd_convert):
+    made = u.stage(frames=(1, 3))
+    u.camera(made)
+    model(made, "/World/Actor")
+    made.GetPrimAtPath("/World/Actor/Model").SetTypeName("Xform")
+    u.quad(made, "/World/Actor/Model/Card/Prop")
+    gltf = usd_convert(made)
+    assert not any(moves(gltf))
+    assert gltf.lost_features("/World/Actor/Model/Card") == ["skinned mesh outside of a SkelRoot"]
+    assert not gltf.lost_features("/World/Actor/Model/Card/Prop")

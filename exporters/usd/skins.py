@@ -35,6 +35,17 @@ def bake_skins(stage: Usd.Stage, span: list[float], lost: Lost, said: Said, prog
         if not baked and len(lost.items) == missing:
             lost.add(path, "skinning", "UsdSkel could not bake it; it stands in its rest pose")
     _specify(stage, overs, Sdf.SpecifierOver)
+    _name_outside(stage, lost)
+
+
+def _name_outside(stage: Usd.Stage, lost: Lost) -> None:
+    """Name what UsdSkel passes over."""
+    for prim in stage.Traverse(Usd.TraverseInstanceProxies()):
+        if not prim.HasAPI(UsdSkel.BindingAPI) or UsdSkel.Root.Find(prim):
+            continue
+        binding = UsdSkel.BindingAPI(prim)
+        if (binding.GetJointIndicesAttr() or binding.GetBlendShapesAttr()) and binding.GetInheritedSkeleton():
+            lost.add(str(prim.GetPath()), "skinned mesh outside of a SkelRoot", "it stands in its rest pose; put it and its skeleton below a SkelRoot")
 
 
 def _specify(stage: Usd.Stage, paths: set[Sdf.Path], specifier: Sdf.Specifier) -> None:
