@@ -167,7 +167,8 @@ def _put_image(image: bpy.types.Image, folder: Path, stem: str) -> str | None:
     target = folder / f"{stem}_world.exr"
     width, height = image.size
     copy = bpy.data.images.new("world", width, height, float_buffer=True)
-    copy.colorspace_settings.name = "Linear Rec.709" if bpy.app.version >= (4, 0, 0) else "Linear"
+    # Other images Blender encodes as it saves them.
+    copy.colorspace_settings.name = "Non-Color"
     pixels = np.empty(width * height * 4, dtype=np.float32)
     image.pixels.foreach_get(pixels)
     if not linear and not image.is_float:

@@ -7,6 +7,7 @@ from urllib.parse import unquote
 
 import numpy as np
 import pytest
+from render_tools import read_exr, rgb
 
 # One pixel column of a different colour each: u = (i + 0.5) / 8.
 COLOURS = np.array([[i / 8, 1 - i / 8, (i % 2)] for i in range(8)], dtype=np.float32)
@@ -77,6 +78,18 @@ def test_mapping_becomes_a_rotation(blender, export, tmp_path, kind, sign):
     tree.links.new(where.outputs["Generated"], mapping.inputs["Vector"])
     tree.links.new(mapping.outputs["Vector"], node.inputs["Vector"])
     assert export().buzz["world"]["rotation"] == pytest.approx(sign * 0.7)
+
+
+@pytest.mark.parametrize("deep", [False, True])
+def test_an_image_that_is_written_anew_is_linear(blender, export, deep):
+    background, tree = world(blender)
+    node = tree.nodes.new("ShaderNodeTexEnvironment")
+    node.image = blender.data.images.new("made", 8, 4, float_buffer=deep)
+    node.image.pixels.foreach_set(np.tile(np.array([0.25, 2, 0.5, 1], dtype=np.float32), 32))
+    tree.links.new(node.outputs["Color"], background.inputs["Color"])
+    gltf = export()
+    want = [0.25, 2, 0.5] if deep else [0.0513, 1, 0.2159]
+    np.testing.assert_allclose(rgb(read_exr(gltf.path.parent / "anim_world.exr")), np.broadcast_to(want, (4, 8, 3)), atol=2e-3)
 
 
 def look_up(path, blender, direction, rotation):
