@@ -24,7 +24,9 @@ from .constants import constant
 from .nodes import source, upstream
 from .prepare import action_curves, is_animated
 
-_READABLE = {".hdr", ".exr", ".png", ".jpg", ".jpeg"}
+_LINEAR = "Linear Rec.709"
+# Files that buzz-convert reads, by the colour space that it takes them to be in.
+_COPIED = {".hdr": _LINEAR, ".exr": _LINEAR, ".png": "sRGB", ".jpg": "sRGB", ".jpeg": "sRGB"}
 _BAKED_WIDTH = 1024
 
 
@@ -121,7 +123,7 @@ def _environment(out: bpy.types.NodeSocket | None) -> tuple[bpy.types.Image, flo
     node = out.node if out is not None else None
     if node is None or node.mute or node.type != "TEX_ENVIRONMENT" or node.image is None or node.projection != "EQUIRECTANGULAR":
         return None
-    if node.image.source not in ("FILE", "GENERATED"):
+    if node.image.source not in ("FILE", "GENERATED") or not _can_be_linear(node.image):
         return None
     vector = node.inputs["Vector"]
     if not vector.is_linked:
@@ -144,18 +146,21 @@ def _environment(out: bpy.types.NodeSocket | None) -> tuple[bpy.types.Image, flo
     return node.image, (rotation[2] if mapping.vector_type == "TEXTURE" else -rotation[2])
 
 
+def _can_be_linear(image: bpy.types.Image) -> bool:
+    """Whether the pixels of an image, if it has any, are linear or sRGB; Blender itself makes those of deep images linear."""
+    # Asking for the size makes Blender load the file, and only then does it know its colour space.
+    return not image.size[0] or image.is_float or image.colorspace_settings.is_data or image.colorspace_settings.name in (_LINEAR, "sRGB")
+
+
 def _put_image(image: bpy.types.Image, folder: Path, stem: str) -> str | None:
     """Copy or write the environment image beside the glTF; its file name. None if it has no pixels."""
-    # Asking for the size makes Blender load the file, and only then does it know its colour space.
-    _ = image.size[0]
     suffix = Path(image.filepath_raw or image.name).suffix.lower()
-    linear = image.colorspace_settings.name.startswith(("Linear", "scene_linear"))
-    eight_bit = suffix in (".png", ".jpg", ".jpeg")
+    space = image.colorspace_settings
     original = Path(bpy.path.abspath(image.filepath_raw, library=image.library)) if image.filepath_raw else None
     missing = image.source == "FILE" and not image.packed_file and not (original and original.is_file())
     if missing or not image.size[0]:
         return None
-    if image.source == "FILE" and suffix in _READABLE and eight_bit != linear:
+    if image.source == "FILE" and space.name == _COPIED.get(suffix):
         target = folder / f"{stem}_world{suffix}"
         if image.packed_file:
             target.write_bytes(image.packed_file.data)
@@ -171,7 +176,7 @@ def _put_image(image: bpy.types.Image, folder: Path, stem: str) -> str | None:
     copy.colorspace_settings.name = "Non-Color"
     pixels = np.empty(width * height * 4, dtype=np.float32)
     image.pixels.foreach_get(pixels)
-    if not linear and not image.is_float:
+    if not image.is_float and not space.is_data and space.name != _LINEAR:
         rgb = pixels.reshape(-1, 4)[:, :3]
         rgb[:] = decoded(rgb)
     copy.pixels.foreach_set(pixels)

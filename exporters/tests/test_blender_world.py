@@ -92,17 +92,31 @@ def test_an_image_that_is_written_anew_is_linear(blender, export, deep):
     np.testing.assert_allclose(rgb(read_exr(gltf.path.parent / "anim_world.exr")), np.broadcast_to(want, (4, 8, 3)), atol=2e-3)
 
 
-def look_up(path, blender, direction, rotation):
+@pytest.mark.parametrize("space", ["sRGB", "Linear Rec.709", "Non-Color", "Linear Rec.2020", "ACEScg"])
+@pytest.mark.parametrize("suffix", [".hdr", ".png"])
+def test_an_image_of_any_colour_space_is_as_bright_as_in_cycles(blender, export, tmp_path, suffix, space):
+    background, tree = world(blender)
+    environment(blender, tree, background, tmp_path, suffix).image.colorspace_settings.name = space
+    seen = cycles_colours(blender, tmp_path)
+    gltf = export()
+    if space == {".hdr": "Linear Rec.709", ".png": "sRGB"}[suffix]:
+        assert gltf.buzz["world"]["image"] == f"anim_world{suffix}"
+        return
+    for turn, want in seen.items():
+        got = look_up(gltf.path.parent / gltf.buzz["world"]["image"], (math.sin(turn), 0.0, -math.cos(turn)), 0.0)
+        np.testing.assert_allclose(got, want, atol=0.02)
+
+
+def look_up(path, direction, rotation):
     """The radiance that docs/extras.md gives a direction (glTF axes)."""
-    image = blender.data.images.load(str(path))
-    width, height = image.size
-    pixels = np.array(image.pixels).reshape(height, width, 4)
+    pixels = rgb(read_exr(path))
+    height, width, _ = pixels.shape
     x, y, z = direction
     # Turned by -rotation about +Y.
     c, s = math.cos(rotation), math.sin(rotation)
     x, z = c * x - s * z, s * x + c * z
     u, v = 0.5 + math.atan2(z, x) / (2 * math.pi), 0.5 - math.asin(y) / math.pi
-    return pixels[min(int((1 - v) * height), height - 1), min(int(u * width), width - 1), :3]
+    return pixels[min(int(v * height), height - 1), min(int(u * width), width - 1)]
 
 
 @pytest.mark.parametrize("rotated", [False, True])
@@ -118,7 +132,7 @@ def test_directions_agree_with_cycles(blender, export, tmp_path, rotated):
     gltf = export()
     for turn, want in seen.items():
         direction = (math.sin(turn), 0.0, -math.cos(turn))
-        got = look_up(gltf.path.parent / gltf.buzz["world"]["image"], blender, direction, gltf.buzz["world"]["rotation"])
+        got = look_up(gltf.path.parent / gltf.buzz["world"]["image"], direction, gltf.buzz["world"]["rotation"])
         np.testing.assert_allclose(got, want, atol=0.02)
     # A Gamma node is beyond a plain image: the sky is baked, and must look the same.
     gamma = tree.nodes.new("ShaderNodeGamma")
@@ -128,7 +142,7 @@ def test_directions_agree_with_cycles(blender, export, tmp_path, rotated):
     assert gltf.buzz["world"]["image"] == "baked_world.exr"
     for turn, want in seen.items():
         direction = (math.sin(turn), 0.0, -math.cos(turn))
-        got = look_up(gltf.path.parent / "baked_world.exr", blender, direction, 0.0)
+        got = look_up(gltf.path.parent / "baked_world.exr", direction, 0.0)
         np.testing.assert_allclose(got, want, atol=0.02)
 
 
