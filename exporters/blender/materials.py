@@ -15,7 +15,7 @@ from ..common.report import Lost
 from .constants import constant, put
 from .groups import inline_groups
 from .mixtures import is_clear, multiply_alpha, uncovered
-from .nodes import CONSTANTS, NORMALS, drop_muted, source, trees, unreadable_inputs, upstream
+from .nodes import CONSTANTS, NORMALS, drop_muted, output_target, source, trees, unreadable_inputs, upstream
 from .prepare import is_animated
 
 # The property of a baked image's node that says what in it depends on the object's place or the view.
@@ -54,7 +54,7 @@ def as_rendered(material: bpy.types.Material, engine: str, lost: Lost) -> None:
         # It shows both sides of everything.
         material.use_backface_culling = False
     tree = material.node_tree
-    shown = tree.get_output_node("CYCLES" if engine == "CYCLES" else "EEVEE") if tree is not None else None
+    shown = tree.get_output_node(output_target(engine)) if tree is not None else None
     if shown is not None:
         for node in [node for node in tree.nodes if node.type == "OUTPUT_MATERIAL" and node != shown]:
             tree.nodes.remove(node)

@@ -38,6 +38,11 @@ def trees(tree: bpy.types.NodeTree) -> list[bpy.types.NodeTree]:
     return list(dict.fromkeys(found))
 
 
+def output_target(engine: str) -> str:
+    """The target of the output nodes that an engine renders."""
+    return "CYCLES" if engine == "CYCLES" else "EEVEE"
+
+
 def source(socket: bpy.types.NodeSocket) -> bpy.types.NodeSocket | None:
     """The output that an input is linked to, past reroutes."""
     while socket.is_linked:

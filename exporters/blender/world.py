@@ -21,7 +21,7 @@ from ..common.motion import Animation
 from ..common.report import Lost
 from ..common.srgb import decoded
 from .constants import constant
-from .nodes import source, upstream
+from .nodes import output_target, source, upstream
 from .prepare import action_curves, is_animated
 
 _LINEAR = "Linear Rec.709"
@@ -39,7 +39,7 @@ def export_world(scene: bpy.types.Scene, folder: Path, stem: str, lost: Lost) ->
     tree = world.node_tree if world.use_nodes else None
     if tree is None:
         return {"color": [tidy(c) for c in world.color], "strength": 1}, ("color",)
-    output, surface = _output(tree), _surface(tree)
+    output, surface = _output(scene), _surface(scene)
     if output is not None and output.inputs["Volume"].is_linked:
         lost.add(world.name, "world volume", "render the mist in compositing, from depth.Z")
     if surface is None:
@@ -50,7 +50,7 @@ def export_world(scene: bpy.types.Scene, folder: Path, stem: str, lost: Lost) ->
         colour, strength = surface.inputs["Color"], surface.inputs["Strength"]
         shone, tint = tidy(max(power, 0.0)), constant(colour)
         if tint is not None:
-            _name_animation(world, tree, [colour, strength], lost)
+            _name_animation(scene, [colour, strength], lost)
             return {"color": [tidy(max(c, 0)) for c in tint], "strength": shone}, ("color", "strength")
         image = _environment(source(colour))
         if image is not None:
@@ -58,19 +58,20 @@ def export_world(scene: bpy.types.Scene, folder: Path, stem: str, lost: Lost) ->
             if uri is None:
                 lost.add(world.name, f"image {image[0].name!r} is missing", "find it with File > External Data > Find Missing Files; the world is black")
                 return black, ()
-            _name_animation(world, tree, [strength], lost)
+            _name_animation(scene, [strength], lost)
             return {"color": [1, 1, 1], "strength": shone, "image": quote(uri), "rotation": tidy(image[1])}, ("strength",)
-    _name_animation(world, tree, [], lost)
+    _name_animation(scene, [], lost)
     return {"color": [1, 1, 1], "strength": 1, "image": quote(_bake(scene, folder, stem)), "rotation": 0}, ()
 
 
-def _output(tree: bpy.types.NodeTree) -> bpy.types.Node | None:
-    return next((n for n in tree.nodes if n.type == "OUTPUT_WORLD" and n.is_active_output), None)
+def _output(scene: bpy.types.Scene) -> bpy.types.Node | None:
+    """The world output that the scene's engine renders."""
+    return scene.world.node_tree.get_output_node(output_target(scene.render.engine))
 
 
-def _surface(tree: bpy.types.NodeTree) -> bpy.types.Node | None:
+def _surface(scene: bpy.types.Scene) -> bpy.types.Node | None:
     """The node that the sky is; None where it is black."""
-    output = _output(tree)
+    output = _output(scene)
     shown = source(output.inputs["Surface"]) if output is not None else None
     return shown.node if shown is not None else None
 
@@ -85,9 +86,10 @@ def _name_losses(world: bpy.types.World, tree: bpy.types.NodeTree, lost: Lost) -
         lost.add(world.name, "sun disc in the sky texture", "it throws no shadow with an edge; turn Sun Disc off and add a Sun light")
 
 
-def _name_animation(world: bpy.types.World, tree: bpy.types.NodeTree, followed: list[bpy.types.NodeSocket], lost: Lost) -> None:
+def _name_animation(scene: bpy.types.Scene, followed: list[bpy.types.NodeSocket], lost: Lost) -> None:
     """What changes in the sky other than the inputs that are followed."""
-    nodes = {out.node for out in upstream(_output(tree).inputs["Surface"])}
+    world, tree = scene.world, scene.world.node_tree
+    nodes = {out.node for out in upstream(_output(scene).inputs["Surface"])}
     data = tree.animation_data
     paths = {curve.data_path for curve in [*action_curves(tree), *(data.drivers if data else [])]}
     paths -= {socket.path_from_id("default_value") for socket in followed}
@@ -111,7 +113,7 @@ def sample_world(scene: bpy.types.Scene) -> dict[str, Any]:
     """Colour and strength now; only of a Background node is either followed."""
     world = scene.world
     tree = world.node_tree if world is not None and world.use_nodes else None
-    surface = _surface(tree) if tree is not None else None
+    surface = _surface(scene) if tree is not None else None
     if surface is None or surface.type != "BACKGROUND":
         return {"color": tuple(world.color) if world is not None else (0, 0, 0), "strength": 1.0}
     colour, strength = constant(surface.inputs["Color"]), constant(surface.inputs["Strength"])
@@ -210,6 +212,10 @@ def _bake(scene: bpy.types.Scene, folder: Path, stem: str) -> str:
     # Half floats end far below the sun.
     sky.render.image_settings.color_depth = "32"
     sky.render.filepath = str(target)
+    shown = _output(scene)
+    for node in scene.world.node_tree.nodes:
+        if node.type == "OUTPUT_WORLD":
+            node.target = "CYCLES" if node == shown else "EEVEE"
     # Nothing is lit here, so Cycles need not work out where the sky is bright.
     scene.world.cycles.sampling_method = "NONE"
     sky.frame_set(scene.frame_current)

@@ -249,6 +249,30 @@ def test_a_muted_mixture_shows_its_first_sky(blender, export):
     assert export().buzz["world"] == {"color": [0, 1, 0], "strength": 1}
 
 
+@pytest.mark.parametrize("engine", ["CYCLES", "BLENDER_EEVEE"])
+@pytest.mark.parametrize("baked", [False, True])
+def test_each_engine_has_its_own_output(blender, export, monkeypatch, engine, baked):
+    monkeypatch.setattr("exporters.blender.world._BAKED_WIDTH", 16)
+    background, tree = world(blender)
+    blender.context.scene.render.engine = engine
+    outputs = {"CYCLES": tree.nodes.new("ShaderNodeOutputWorld"), "BLENDER_EEVEE": background.outputs[0].links[0].to_node}
+    for name, output in outputs.items():
+        output.target = name.removeprefix("BLENDER_")
+        shown = tree.nodes.new("ShaderNodeBackground")
+        shown.inputs["Color"].default_value = (1, 0, 0, 1) if name == engine else (0, 0, 1, 1)
+        twice = tree.nodes.new("ShaderNodeAddShader") if baked else shown
+        if baked:
+            tree.links.new(shown.outputs[0], twice.inputs[0])
+            tree.links.new(shown.outputs[0], twice.inputs[1])
+        tree.links.new(twice.outputs[0], output.inputs["Surface"])
+        output.is_active_output = name != engine
+    gltf = export()
+    if baked:
+        np.testing.assert_allclose(rgb(read_exr(gltf.path.parent / "anim_world.exr"))[4, 8], [2, 0, 0])
+    else:
+        assert gltf.buzz["world"]["color"] == [1, 0, 0]
+
+
 STRENGTH = "/scenes/0/extras/buzz/world/strength"
 
 
