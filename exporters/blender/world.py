@@ -27,7 +27,8 @@ from .prepare import action_curves, is_animated
 _LINEAR = "Linear Rec.709"
 # Files that buzz-convert reads, by the colour space that it takes them to be in.
 _COPIED = {".hdr": _LINEAR, ".exr": _LINEAR, ".png": "sRGB", ".jpg": "sRGB", ".jpeg": "sRGB"}
-_BAKED_WIDTH = 1024
+# How wide a sky is baked, and one of wider images at most.
+_BAKED_WIDTH, _WIDEST = 1024, 8192
 
 
 def export_world(scene: bpy.types.Scene, folder: Path, stem: str, lost: Lost) -> tuple[dict[str, Any], tuple[str, ...]]:
@@ -61,7 +62,7 @@ def export_world(scene: bpy.types.Scene, folder: Path, stem: str, lost: Lost) ->
             _name_animation(scene, [strength], lost)
             return {"color": [1, 1, 1], "strength": shone, "image": quote(uri), "rotation": tidy(image[1])}, ("strength",)
     _name_animation(scene, [], lost)
-    return {"color": [1, 1, 1], "strength": 1, "image": quote(_bake(scene, folder, stem)), "rotation": 0}, ()
+    return {"color": [1, 1, 1], "strength": 1, "image": quote(_bake(scene, folder, stem, lost)), "rotation": 0}, ()
 
 
 def _output(scene: bpy.types.Scene) -> bpy.types.Node | None:
@@ -188,8 +189,14 @@ def _put_image(image: bpy.types.Image, folder: Path, stem: str) -> str | None:
     return target.name
 
 
-def _bake(scene: bpy.types.Scene, folder: Path, stem: str) -> str:
-    """Render the world alone with Cycles through an equirectangular camera; the file name of the image."""
+def _bake(scene: bpy.types.Scene, folder: Path, stem: str, lost: Lost) -> str:
+    """Render the world alone with Cycles through an equirectangular camera, as wide as its images; the file name of the image."""
+    shown = _output(scene)
+    nodes = {out.node for out in upstream(shown.inputs["Surface"])}
+    detail = max((node.image.size[0] for node in nodes if node.type == "TEX_ENVIRONMENT" and node.image is not None), default=0)
+    if detail > _WIDEST:
+        lost.add(scene.world.name, f"sky of {detail} pixels", f"it is baked {_WIDEST} pixels wide; link the image itself to the Background node")
+    width = min(max(detail, _BAKED_WIDTH), _WIDEST)
     target = folder / f"{stem}_world.exr"
     sky = bpy.data.scenes.new("world")
     sky.world = scene.world
@@ -204,15 +211,15 @@ def _bake(scene: bpy.types.Scene, folder: Path, stem: str) -> str:
     sky.collection.objects.link(camera)
     sky.camera = camera
     sky.render.engine = "CYCLES"
-    # A sun's disc is as small as a pixel: as many rays as find its share of one.
-    sky.cycles.samples, sky.cycles.use_denoising, sky.cycles.pixel_filter_type = 64, False, "BOX"
-    sky.render.resolution_x, sky.render.resolution_y, sky.render.resolution_percentage = _BAKED_WIDTH, _BAKED_WIDTH // 2, 100
+    # A sun's disc is as small as a pixel of the narrowest sky: as many rays as find its share of one, however wide.
+    sky.cycles.samples = max(64 * _BAKED_WIDTH**2 // width**2, 4)
+    sky.cycles.use_denoising, sky.cycles.pixel_filter_type = False, "BOX"
+    sky.render.resolution_x, sky.render.resolution_y, sky.render.resolution_percentage = width, width // 2, 100
     sky.cycles.use_adaptive_sampling = False
     sky.render.image_settings.file_format = "OPEN_EXR"
     # Half floats end far below the sun.
     sky.render.image_settings.color_depth = "32"
     sky.render.filepath = str(target)
-    shown = _output(scene)
     for node in scene.world.node_tree.nodes:
         if node.type == "OUTPUT_WORLD":
             node.target = "CYCLES" if node == shown else "EEVEE"

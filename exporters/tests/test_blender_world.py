@@ -273,6 +273,19 @@ def test_each_engine_has_its_own_output(blender, export, monkeypatch, engine, ba
         assert gltf.buzz["world"]["color"] == [1, 0, 0]
 
 
+@pytest.mark.parametrize(("widest", "width"), [(128, 64), (32, 32)])
+def test_a_sky_is_baked_as_wide_as_its_image(blender, export, tmp_path, monkeypatch, widest, width):
+    monkeypatch.setattr("exporters.blender.world._BAKED_WIDTH", 16)
+    monkeypatch.setattr("exporters.blender.world._WIDEST", widest)
+    background, tree = world(blender)
+    node, turned = environment(blender, tree, background, tmp_path, ".hdr"), tree.nodes.new("ShaderNodeHueSaturation")
+    tree.links.new(node.outputs["Color"], turned.inputs["Color"])
+    tree.links.new(turned.outputs["Color"], background.inputs["Color"])
+    gltf = export()
+    assert read_exr(gltf.path.parent / "anim_world.exr")["R"].shape == (width // 2, width)
+    assert gltf.lost_features("World") == (["sky of 64 pixels"] if widest < 64 else [])
+
+
 STRENGTH = "/scenes/0/extras/buzz/world/strength"
 
 
