@@ -29,6 +29,13 @@ _LINEAR = "Linear Rec.709"
 _COPIED = {".hdr": _LINEAR, ".exr": _LINEAR, ".png": "sRGB", ".jpg": "sRGB", ".jpeg": "sRGB"}
 # How wide a sky is baked, and one of wider images at most.
 _BAKED_WIDTH, _WIDEST = 1024, 8192
+# Which rays the world may be hidden from.
+_RAYS = {
+    "camera": ("the camera", "it is seen here; pass --transparent to buzz-convert"),
+    "diffuse": ("diffuse rays", "it lights surfaces here; use a darker world, and put the backdrop in in compositing"),
+    "glossy": ("reflections", "mirrors show it here"),
+    "transmission": ("transmission rays", "it is seen through glass here"),
+}
 
 
 def export_world(scene: bpy.types.Scene, folder: Path, stem: str, lost: Lost) -> tuple[dict[str, Any], tuple[str, ...]]:
@@ -81,8 +88,9 @@ def _name_losses(world: bpy.types.World, tree: bpy.types.NodeTree, lost: Lost) -
     """What rays of one kind see otherwise than those of another, and a sun as a part of the sky."""
     if any(node.type == "LIGHT_PATH" for node in tree.nodes):
         lost.add(world.name, "light path in the world", "what the camera sees lights the scene too; exchange the backdrop in compositing")
-    if not getattr(getattr(world, "cycles_visibility", None), "camera", True):
-        lost.add(world.name, "world hidden from the camera", "it is seen here; pass --transparent to buzz-convert")
+    for rays, (label, action) in _RAYS.items():
+        if not getattr(getattr(world, "cycles_visibility", None), rays, True):
+            lost.add(world.name, f"world hidden from {label}", action)
     if any(node.type == "TEX_SKY" and getattr(node, "sun_disc", False) for node in tree.nodes):
         lost.add(world.name, "sun disc in the sky texture", "it throws no shadow with an edge; turn Sun Disc off and add a Sun light")
 

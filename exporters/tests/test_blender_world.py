@@ -205,8 +205,10 @@ def test_what_a_world_loses_is_named(blender, export):
     background, tree = world(blender)
     path = tree.nodes.new("ShaderNodeLightPath")
     tree.links.new(path.outputs["Is Camera Ray"], background.inputs["Strength"])
-    blender.context.scene.world.cycles_visibility.camera = False
-    assert set(export().lost_features("World")) == {"light path in the world", "world hidden from the camera"}
+    for rays in ("camera", "diffuse", "glossy", "transmission"):
+        setattr(blender.context.scene.world.cycles_visibility, rays, False)
+    hidden = {f"world hidden from {rays}" for rays in ("the camera", "diffuse rays", "reflections", "transmission rays")}
+    assert set(export().lost_features("World")) == {"light path in the world", *hidden}
 
 
 def test_mist_without_a_sky_is_named(blender, export):
