@@ -12,8 +12,8 @@ import bpy
 import numpy as np
 
 from ..common.srgb import encoded
-from .materials import PLACED, make_plain, output_of
-from .nodes import PAIRS, placed, unreadable_inputs
+from .materials import DEFORMED, PLACED, make_plain, output_of
+from .nodes import PAIRS, is_generated, placed, unreadable_inputs
 
 _UV = "buzz-bake"
 # Only what is a colour or a value of the surface itself; a normal cannot be baked through an emission shader.
@@ -111,6 +111,8 @@ def _bake_input(scene: bpy.types.Scene, ob: bpy.types.Object, slot: bpy.types.Ma
         _move(tree, shader.inputs["Emission Strength"], emission.inputs["Strength"])
     if what := placed(emission.inputs["Color"]) or placed(emission.inputs["Strength"]):
         texture[PLACED] = what
+    if DEFORMED in ob.data and (is_generated(emission.inputs["Color"]) or is_generated(emission.inputs["Strength"])):
+        texture[DEFORMED] = True
     tree.links.new(emission.outputs[0], output.inputs["Surface"])
     tree.nodes.active = texture
     _bake(scene, ob, slot)

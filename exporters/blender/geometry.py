@@ -15,11 +15,17 @@ import numpy as np
 
 from ..common.morph import choose_targets
 from ..common.report import Lost
-from .materials import default_surface, own_copy
+from .materials import DEFORMED, default_surface, own_copy
 from .prepare import is_animated
 
 # Modifiers that may change what of a mesh is not its vertices' positions.
 _CHANGES_ATTRIBUTES = {"NODES", "UV_WARP", "UV_PROJECT", "DATA_TRANSFER"}
+# Modifiers that bend a mesh, and leave its generated coordinates alone.
+_DEFORMS = {
+    "ARMATURE", "CAST", "CLOTH", "CORRECTIVE_SMOOTH", "CURVE", "DISPLACE", "HOOK", "LAPLACIANDEFORM", "LAPLACIANSMOOTH", "LATTICE", "MESH_CACHE",
+    "MESH_DEFORM", "SHRINKWRAP", "SIMPLE_DEFORM", "SMOOTH", "SOFT_BODY", "SURFACE_DEFORM", "WARP", "WAVE",
+}  # fmt: skip
+_DEFORMING_PARENTS = ("ARMATURE", "LATTICE", "CURVE")
 # Other objects that a curve's or a text's own data is shaped by.
 _SHAPED_BY = ("bevel_object", "taper_object", "follow_curve")
 
@@ -114,6 +120,10 @@ class GeometryStore:
     def _new(self, ob: bpy.types.Object, topology: bytes) -> int:
         # new_from_object() gives the mesh of the instancer for geometry-nodes instances; a copy of the evaluated data does not.
         mesh = ob.data.copy()
+        # Generated coordinates are measured by the box of the mesh before its modifiers, which the evaluated one still has.
+        mesh.use_auto_texspace = False
+        if _is_deformed(ob.original):
+            mesh[DEFORMED] = True
         for i, slot in enumerate(ob.material_slots):
             if slot.link == "OBJECT" and i < max(len(mesh.materials), 1):
                 material = slot.material.original if slot.material else None
@@ -161,7 +171,7 @@ def may_deform(ob: bpy.types.Object) -> bool:
     source = ob.original
     data = source.data
     # A parent of these kinds is a modifier that is in no list.
-    if source.modifiers or source.parent_type in ("ARMATURE", "LATTICE", "CURVE"):
+    if source.modifiers or source.parent_type in _DEFORMING_PARENTS:
         return True
     if source.type == "META" or is_animated(data) or getattr(data, "shape_keys", None) is not None:
         return True
@@ -170,6 +180,12 @@ def may_deform(ob: bpy.types.Object) -> bool:
     if source.type == "FONT" and (handlers.frame_change_pre or handlers.frame_change_post):
         return True
     return any(getattr(data, other, None) is not None for other in _SHAPED_BY)
+
+
+def _is_deformed(ob: bpy.types.Object) -> bool:
+    """Whether an object's mesh is bent out of the form that its generated coordinates are those of."""
+    bent = any(modifier.type in _DEFORMS and modifier.show_render for modifier in ob.modifiers)
+    return bent or ob.parent_type in _DEFORMING_PARENTS or getattr(ob.data, "shape_keys", None) is not None
 
 
 def _fill_slots(mesh: bpy.types.Mesh, override: bpy.types.Material | None, made: dict[bpy.types.Material | None, bpy.types.Material]) -> None:

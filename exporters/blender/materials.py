@@ -20,6 +20,8 @@ from .prepare import is_animated
 
 # The property of a baked image's node that says what in it depends on the object's place or the view.
 PLACED = "placed"
+# The property of a mesh that is bent out of its first form, and of the node of an image that depends on what that was.
+DEFORMED = "deformed"
 _DROPPED = {"Subsurface Weight": "subsurface scattering", "Thin Film Thickness": "thin film"}
 
 
@@ -177,6 +179,9 @@ def _name_losses(shader: bpy.types.Node, meshes: list[bpy.types.Mesh], name: str
         for what in {out.node[PLACED] for out in upstream(socket) if PLACED in out.node}:
             feature = f"{socket.name.lower()} that depends on the object's place or the view ({what})"
             lost.add(name, feature, "it is baked once, for an object at the origin; bake each object by itself")
+        if any(DEFORMED in out.node for out in upstream(socket)):
+            feature = f"{socket.name.lower()} by generated coordinates of a mesh that is deformed"
+            lost.add(name, feature, "they are those of its shape in the first frame, not of the one before it is deformed; lay the texture by UV")
     for key, label in _DROPPED.items():
         value = shader.inputs.get(key)
         if value is not None and (value.is_linked or value.default_value > 0):

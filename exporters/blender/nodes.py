@@ -28,6 +28,8 @@ _PLACED = {
     "OBJECT_INFO", "PARTICLE_INFO", "HAIR_INFO", "POINT_INFO", "CAMERA", "LIGHT_PATH", "LAYER_WEIGHT", "FRESNEL", "AMBIENT_OCCLUSION",
 }  # fmt: skip
 _PLACED_OUTPUTS = {"NEW_GEOMETRY": {"Position", "Normal", "Tangent", "True Normal", "Incoming"}, "TEX_COORD": {"Camera", "Window", "Reflection"}}
+# Nodes that take generated coordinates where they are given none.
+_GENERATED = {"TEX_BRICK", "TEX_CHECKER", "TEX_GABOR", "TEX_GRADIENT", "TEX_MAGIC", "TEX_NOISE", "TEX_VORONOI", "TEX_WAVE"}
 
 
 def trees(tree: bpy.types.NodeTree) -> list[bpy.types.NodeTree]:
@@ -84,6 +86,12 @@ def drop_muted(tree: bpy.types.NodeTree) -> None:
 def placed(socket: bpy.types.NodeSocket) -> str | None:
     """What before an input depends on the object's place, its instance or the view."""
     return next((_label(out.node) for out in upstream(socket) if _is_placed(out)), None)
+
+
+def is_generated(socket: bpy.types.NodeSocket) -> bool:
+    """Whether what is before an input depends on generated coordinates."""
+    nodes = [(out.node, out.name) for out in upstream(socket)]
+    return any((n.type == "TEX_COORD" and name == "Generated") or (n.type in _GENERATED and not n.inputs["Vector"].is_linked) for n, name in nodes)
 
 
 def _is_placed(out: bpy.types.NodeSocket) -> bool:

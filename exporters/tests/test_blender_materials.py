@@ -209,6 +209,37 @@ def test_emission_strength_from_an_image_is_baked(blender, surface, export):
     assert "emissiveTexture" in material
 
 
+def shine_by_generated(surface):
+    """A surface that shines as far as its generated coordinates reach in X."""
+    split = node(surface, "SeparateXYZ")
+    link(node(surface, "TexCoord").outputs["Generated"], split.inputs[0])
+    link(split.outputs["X"], surface.inputs["Emission Color"])
+    surface.inputs["Emission Strength"].default_value = 1
+
+
+def test_generated_coordinates_are_of_the_mesh_before_its_modifiers(blender, surface, export):
+    array = blender.data.objects["Square"].modifiers.new("Array", "ARRAY")
+    array.count, array.relative_offset_displace = 3, (1.2, 0, 0)
+    shine_by_generated(surface)
+    gltf = export(bake=64)
+    assert material_of(gltf)["extensions"]["KHR_materials_emissive_strength"]["emissiveStrength"] == pytest.approx(3.4, rel=0.05)
+    assert gltf.lost_features("Grey") == []
+
+
+@pytest.mark.parametrize("bent", ["modifier", "shape keys"])
+def test_generated_coordinates_of_a_deformed_mesh_are_named(blender, surface, export, bent):
+    ob = blender.data.objects["Square"]
+    if bent == "modifier":
+        ob.modifiers.new("Modifier", "CAST")
+    else:
+        ob.shape_key_add(name="Basis")
+    shine_by_generated(surface)
+    assert export(bake=16).lost_features("Grey") == ["emission color by generated coordinates of a mesh that is deformed"]
+    # A texture without coordinates has these.
+    link(node(surface, "TexNoise").outputs["Color"], surface.inputs["Base Color"])
+    assert export("noise.gltf", bake=16).lost_features("Grey")[0] == "base color by generated coordinates of a mesh that is deformed"
+
+
 def test_emission_strength_from_an_image_is_named_without_baking(blender, surface, export):
     link(texture(blender, surface), surface.inputs["Emission Strength"])
     assert export(bake=0).lost_features("Grey") == ["procedural emission strength (image node)"]
