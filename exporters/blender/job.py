@@ -29,7 +29,7 @@ from .images import name_as_files
 from .losses import name_scene_losses, name_scripts
 from .materials import as_rendered, prepare_materials
 from .output import GENERATOR, Output
-from .prepare import prepare
+from .prepare import prepare, work_in_rec709
 from .sample import InstanceTrack, Sampler
 
 # What a disk, a quota or a limit says that has no room.
@@ -88,6 +88,7 @@ class _Export:
 
     def run(self) -> Result:
         """Do the whole job."""
+        work_in_rec709(self.lost)
         prepare(self.scene, self.view_layer)
         name_scene_losses(self.scene, self.view_layer, self.lost)
         self.options.progress(f"sampling frames {self.frames[0]}-{self.frames[1]}")

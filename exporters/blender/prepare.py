@@ -7,11 +7,16 @@ the user's file), so the switches are simply set to what the render would use.
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import bpy
 
+from ..common.report import Lost
 from .groups import inline_groups
 from .nodes import drop_muted, trees
 
+# The space of glTF's colours.
+LINEAR = "Linear Rec.709"
 # (viewport, render) pairs of properties that modifiers, curves, metaballs and particle settings have.
 _LEVELS = (("levels", "render_levels"), ("screw_steps", "render_steps"), ("steps", "render_steps"), ("viewport_resolution", "resolution"))
 # Modifiers of what simulations of other objects meet.
@@ -57,6 +62,34 @@ def prepare(scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer) -> None:
     for tree in bpy.data.node_groups:
         _is_render(tree)
     view_layer.update()
+
+
+def work_in_rec709(lost: Lost) -> None:
+    """Have Blender convert the file's colours to those of glTF, if it works in another space (from 5.0 on it may)."""
+    space = getattr(bpy.data, "colorspace", None)
+    if space is None or space.working_space_interop_id == "lin_rec709_scene":
+        return
+    if LINEAR not in space.bl_rna.properties["working_space"].enum_items:
+        what = f"colours in {space.working_space}"
+        lost.add(Path(bpy.data.filepath).name or "the file", what, f"they are taken for {LINEAR}; open the file with Blender's own colour management")
+        return
+    for owner in bpy.data.user_map():
+        keyed = [each for each in (owner, getattr(owner, "node_tree", None)) if each is not None]
+        if any(_is_colour(each, curve.data_path) for each in keyed for curve in action_curves(each)):
+            what = f"animated colours in {space.working_space}"
+            lost.add(owner.name, what, f"their keys are taken for {LINEAR}; choose that working space and key them anew")
+    bpy.ops.wm.set_working_color_space(working_space=LINEAR, convert_colors=True)
+
+
+def _is_colour(owner: bpy.types.ID, path: str) -> bool:
+    """Whether a path leads to a colour."""
+    where, _, name = path.rpartition(".")
+    try:
+        holder = owner.path_resolve(where) if where else owner
+        return holder.bl_rna.properties[name].subtype == "COLOR"
+    except (KeyError, ValueError, AttributeError):
+        # What is gone, and custom properties.
+        return False
 
 
 def _leave_edit_mode(view_layer: bpy.types.ViewLayer) -> None:
@@ -163,7 +196,7 @@ def rendered_objects(view_layer: bpy.types.ViewLayer) -> set[str]:
 
 def action_curves(owner: bpy.types.ID) -> list[bpy.types.FCurve]:
     """The F-curves of a datablock: of its action and of those in its NLA strips."""
-    data = owner.animation_data
+    data = getattr(owner, "animation_data", None)
     if data is None:
         return []
     strips = [strip for track in data.nla_tracks for strip in track.strips]

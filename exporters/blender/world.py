@@ -22,11 +22,10 @@ from ..common.report import Lost
 from ..common.srgb import decoded
 from .constants import constant
 from .nodes import output_target, source, upstream
-from .prepare import action_curves, is_animated
+from .prepare import LINEAR, action_curves, is_animated
 
-_LINEAR = "Linear Rec.709"
 # Files that buzz-convert reads, by the colour space that it takes them to be in.
-_COPIED = {".hdr": _LINEAR, ".exr": _LINEAR, ".png": "sRGB", ".jpg": "sRGB", ".jpeg": "sRGB"}
+_COPIED = {".hdr": LINEAR, ".exr": LINEAR, ".png": "sRGB", ".jpg": "sRGB", ".jpeg": "sRGB"}
 # How wide a sky is baked, and one of wider images at most.
 _BAKED_WIDTH, _WIDEST = 1024, 8192
 # Which rays the world may be hidden from.
@@ -160,7 +159,7 @@ def _environment(out: bpy.types.NodeSocket | None) -> tuple[bpy.types.Image, flo
 def _can_be_linear(image: bpy.types.Image) -> bool:
     """Whether the pixels of an image, if it has any, are linear or sRGB; Blender itself makes those of deep images linear."""
     # Asking for the size makes Blender load the file, and only then does it know its colour space.
-    return not image.size[0] or image.is_float or image.colorspace_settings.is_data or image.colorspace_settings.name in (_LINEAR, "sRGB")
+    return not image.size[0] or image.is_float or image.colorspace_settings.is_data or image.colorspace_settings.name in (LINEAR, "sRGB")
 
 
 def _put_image(image: bpy.types.Image, folder: Path, stem: str) -> str | None:
@@ -187,7 +186,7 @@ def _put_image(image: bpy.types.Image, folder: Path, stem: str) -> str | None:
     copy.colorspace_settings.name = "Non-Color"
     pixels = np.empty(width * height * 4, dtype=np.float32)
     image.pixels.foreach_get(pixels)
-    if not image.is_float and not space.is_data and space.name != _LINEAR:
+    if not image.is_float and not space.is_data and space.name != LINEAR:
         rgb = pixels.reshape(-1, 4)[:, :3]
         rgb[:] = decoded(rgb)
     copy.pixels.foreach_set(pixels)

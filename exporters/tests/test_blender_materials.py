@@ -470,3 +470,28 @@ def test_materials_of_a_library(blender, surface, export, tmp_path):
     assert {material["name"] for material in gltf.root["materials"]} == {"Grey", "Other"}
     for material in gltf.root["materials"]:
         np.testing.assert_allclose(colour_of(blender, gltf, material["pbrMetallicRoughness"]["baseColorTexture"]), (1, 0, 0), atol=0.01)
+
+
+@pytest.mark.parametrize("animated", [False, True])
+def test_colours_of_another_working_space_are_converted(blender, surface, export, animated):
+    import blender_scene as b
+
+    if not hasattr(blender.data, "colorspace"):
+        pytest.skip("only Blender 5.0 and later have working spaces")
+    lamp, red = blender.data.lights["Light"], [1, 0.25, 0]
+    lamp.color = red
+    surface.inputs["Base Color"].default_value = (*red, 1)
+    world = blender.context.scene.world = blender.data.worlds.new("World")
+    world.node_tree.nodes["Background"].inputs["Color"].default_value = (*red, 1)
+    blender.ops.wm.set_working_color_space(working_space="Linear Rec.2020", convert_colors=True)
+    if animated:
+        b.key(lamp, "color", {1: lamp.color[:], 2: (0, 0, 0)})
+        b.key(surface.inputs["Base Color"], "default_value", {1: (1, 1, 1, 1), 2: (0, 0, 0, 1)})
+    gltf = export()
+    if animated:
+        assert gltf.lost_features("Light") == ["animated colours in Linear Rec.2020"]
+        assert gltf.lost_features("Grey") == ["animated colours in Linear Rec.2020", "animated material"]
+        return
+    assert gltf.light("Light")[1]["color"] == pytest.approx(red, abs=1e-3)
+    assert material_of(gltf)["pbrMetallicRoughness"]["baseColorFactor"][:3] == pytest.approx(red, abs=1e-3)
+    assert gltf.buzz["world"]["color"] == pytest.approx(red, abs=1e-3)
