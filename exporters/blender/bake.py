@@ -16,6 +16,8 @@ from .materials import DEFORMED, PLACED, make_plain, output_of
 from .nodes import PAIRS, is_generated, placed, unreadable_inputs
 
 _UV = "buzz-bake"
+# How many a mesh of Blender's may have.
+_MOST_UVS = 8
 # Only what is a colour or a value of the surface itself; a normal cannot be baked through an emission shader.
 _COLOURS = ("Base Color", "Emission Color")
 # Values, and the channel that glTF reads each from; Blender's exporter wants to see it in the nodes.
@@ -36,8 +38,10 @@ def bake_procedural(scene: bpy.types.Scene, size: int, progress: Callable[[str],
     scene.cycles.use_denoising = False
     scene.render.bake.margin = 4
     for ob, slot, inputs in jobs:
+        if not _unwrap(scene, ob):
+            # It is named with what else is not baked.
+            continue
         progress(f"baking {slot.material.name}: {', '.join(inputs).lower()}")
-        _unwrap(scene, ob)
         if users[slot.material] > 1:
             slot.material = slot.material.copy()
         for name in inputs:
@@ -65,10 +69,15 @@ def _principled(tree: bpy.types.NodeTree) -> bpy.types.Node | None:
     return node if node.type == "BSDF_PRINCIPLED" else None
 
 
-def _unwrap(scene: bpy.types.Scene, ob: bpy.types.Object) -> None:
-    """A UV map of its own for the baked images, without overlaps."""
+def _unwrap(scene: bpy.types.Scene, ob: bpy.types.Object) -> bool:
+    """Make a UV map of its own for the baked images, without overlaps; whether there is room for one."""
     if _UV in ob.data.uv_layers:
-        return
+        return True
+    if len(ob.data.uv_layers) >= _MOST_UVS:
+        spare = _unused_uv(ob)
+        if spare is None:
+            return False
+        ob.data.uv_layers.remove(spare)
     # Names, not layers: adding one moves the others in memory.
     active = ob.data.uv_layers.active.name if ob.data.uv_layers.active else None
     ob.data.uv_layers.new(name=_UV, do_init=True)
@@ -81,6 +90,14 @@ def _unwrap(scene: bpy.types.Scene, ob: bpy.types.Object) -> None:
     if active is not None:
         # What other textures use (the render layer) must stay what it was.
         ob.data.uv_layers.active = ob.data.uv_layers[active]
+    return True
+
+
+def _unused_uv(ob: bpy.types.Object) -> bpy.types.MeshUVLoopLayer | None:
+    """A UV map that no material of an object asks for."""
+    nodes = [node for slot in ob.material_slots if slot.material.node_tree is not None for node in slot.material.node_tree.nodes]
+    asked = {getattr(node, key, "") for node in nodes for key in ("uv_map", "attribute_name")}
+    return next((layer for layer in ob.data.uv_layers if not layer.active_render and layer.name not in asked), None)
 
 
 def _only(scene: bpy.types.Scene, ob: bpy.types.Object) -> None:

@@ -282,6 +282,19 @@ def test_what_shares_a_texture_is_baked_together(blender, surface, export):
     assert "Grey-Roughness" in names
 
 
+@pytest.mark.parametrize("asked", [False, True])
+def test_a_mesh_that_has_all_uv_maps_gives_up_one_for_baking(blender, surface, export, asked):
+    mesh = blender.data.objects["Square"].data
+    for i in range(7):
+        name = mesh.uv_layers.new(name=f"Map {i}").name
+        if asked:
+            node(surface, "UVMap", uv_map=name)
+    link(node(surface, "TexNoise").outputs["Color"], surface.inputs["Base Color"])
+    gltf = export(bake=16)
+    assert ("baseColorTexture" in material_of(gltf)["pbrMetallicRoughness"]) != asked
+    assert gltf.lost_features("Grey") == (["procedural base color (noise node)"] if asked else [])
+
+
 @pytest.mark.parametrize(("mode", "names"), [("STRAIGHT", ["Picture"]), ("NONE", ["Grey-Alpha"])])
 def test_alpha_that_is_off_is_baked(blender, surface, export, mode, names):
     link(cut_out(blender, surface, "Alpha", alpha_mode=mode), surface.inputs["Alpha"])
