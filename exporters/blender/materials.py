@@ -46,8 +46,7 @@ def prepare_materials(materials: list[bpy.types.Material], lost: Lost) -> None:
         shader = output.inputs["Surface"].links[0].from_node
         if shader.type != "BSDF_PRINCIPLED":
             shader = _choose_principled(tree, output, shader, material.name, lost)
-        if shader is not None:
-            _name_losses(shader, meshes_of(material), material.name, lost)
+        _name_losses(shader, meshes_of(material), material.name, lost)
 
 
 def as_rendered(material: bpy.types.Material, engine: str, lost: Lost) -> None:
@@ -98,14 +97,7 @@ def make_plain(tree: bpy.types.NodeTree) -> None:
     shader = shown.node if shown is not None else None
     settings = _as_principled(tree, shader)
     if settings is not None:
-        shader = tree.nodes.new("ShaderNodeBsdfPrincipled")
-        for key, value in settings.items():
-            if not isinstance(value, bpy.types.NodeSocket):
-                shader.inputs[key].default_value = value
-            elif value.is_linked:
-                tree.links.new(value.links[0].from_socket, shader.inputs[key])
-            elif value.type != "VECTOR":
-                shader.inputs[key].default_value = value.default_value
+        shader = _new_principled(tree, settings)
     if shader.type == "BSDF_PRINCIPLED":
         tree.links.new(shader.outputs[0], surface)
         for cover in covers:
@@ -144,6 +136,19 @@ def _as_principled(tree: bpy.types.NodeTree, shader: bpy.types.Node | None) -> d
     return None
 
 
+def _new_principled(tree: bpy.types.NodeTree, settings: dict) -> bpy.types.Node:
+    """A Principled BSDF of values, and of inputs to copy."""
+    shader = tree.nodes.new("ShaderNodeBsdfPrincipled")
+    for key, value in settings.items():
+        if not isinstance(value, bpy.types.NodeSocket):
+            shader.inputs[key].default_value = value
+        elif value.is_linked:
+            tree.links.new(value.links[0].from_socket, shader.inputs[key])
+        elif value.type != "VECTOR":
+            shader.inputs[key].default_value = value.default_value
+    return shader
+
+
 def _fold_constants(tree: bpy.types.NodeTree, shader: bpy.types.Node) -> None:
     """Put what nodes always give into the inputs themselves, where Blender's exporter always sees it."""
     for socket in shader.inputs:
@@ -153,14 +158,17 @@ def _fold_constants(tree: bpy.types.NodeTree, shader: bpy.types.Node) -> None:
             tree.links.remove(socket.links[0])
 
 
-def _choose_principled(tree, output, shader, name: str, lost: Lost) -> bpy.types.Node | None:
-    """The Principled BSDF that stands for a mixture of shaders."""
+def _choose_principled(tree, output, shader, name: str, lost: Lost) -> bpy.types.Node:
+    """The Principled BSDF that stands for a mixture of shaders: one in it, else one like its first plain shader, else Blender's grey."""
     lost.add(name, f"{shader.bl_label or shader.type} shader", "use a Principled BSDF, directly under the output")
-    nodes = [out.node for out in upstream(output.inputs["Surface"])]
-    chosen = next((n for n in nodes if n.type == "BSDF_PRINCIPLED" and n.id_data == tree), None)
-    if chosen is not None:
-        tree.links.new(chosen.outputs[0], output.inputs["Surface"])
-        _fold_constants(tree, chosen)
+    nodes = [node for out in upstream(output.inputs["Surface"]) if (node := out.node).id_data == tree]
+    chosen = next((n for n in nodes if n.type == "BSDF_PRINCIPLED"), None)
+    if chosen is None:
+        # The last inputs come first.
+        plain = (settings for n in reversed(nodes) if not is_clear(n) and (settings := _as_principled(tree, n)))
+        chosen = _new_principled(tree, next(plain, {}))
+    tree.links.new(chosen.outputs[0], output.inputs["Surface"])
+    _fold_constants(tree, chosen)
     return chosen
 
 

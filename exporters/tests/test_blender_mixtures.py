@@ -160,3 +160,23 @@ def test_a_coloured_transparent_is_no_alpha(blender, surface, export):
     made = mix(surface, 0.5, 1)
     made.inputs[1].links[0].from_node.inputs["Color"].default_value = (1, 0, 0, 1)
     assert export().lost_features("Grey") == ["Mix Shader shader"]
+
+
+@pytest.mark.parametrize(("kinds", "colour"), [(("Transparent", "Diffuse", "Anisotropic"), [1, 0.25, 0, 1]), (("Toon", "Sheen"), [0.8, 0.8, 0.8, 1])])
+def test_a_mixture_without_principled_is_its_first_plain_shader(blender, surface, export, kinds, colour):
+    shaders = [node(surface, f"Bsdf{kind}") for kind in kinds]
+    for shader in shaders:
+        shader.inputs["Color"].default_value = (1, 1, 1, 1) if shader.type == "BSDF_TRANSPARENT" else (1, 0.25, 0, 1)
+    shown = shaders[0].outputs[0]
+    for shader in shaders[1:]:
+        mix = node(surface, "AddShader")
+        link(shown, mix.inputs[0])
+        link(shader.outputs[0], mix.inputs[1])
+        shown = mix.outputs[0]
+    link(shown, surface.id_data.get_output_node("ALL").inputs["Surface"])
+    surface.id_data.nodes.remove(surface)
+    gltf = export()
+    values = material_of(gltf)["pbrMetallicRoughness"]
+    assert values["baseColorFactor"] == pytest.approx(colour)
+    assert values["metallicFactor"] == 0
+    assert gltf.lost_features("Grey") == ["Add Shader shader"]
