@@ -107,7 +107,7 @@ class _Export:
         for track in sampler.instances.values():
             self._instance(document, animation, sampler, track)
         for light in sampler.lights.values():
-            light.write(document, animation, self.lost)
+            light.write(document, animation, self.scene.render.engine, self.lost)
         for camera in sampler.cameras:
             camera.write(document, animation, self.lost)
         surround, followed = world.export_world(self.scene, self.output.folder, self.output.stem, self.lost)

@@ -49,18 +49,18 @@ class LightTrack:
         self.values.append(self.values[-1])
         self.visible.append(False)
 
-    def write(self, document: Document, animation: Animation, lost: Lost) -> None:
-        """Add light, node and channels; a light that is never on is left out."""
+    def write(self, document: Document, animation: Animation, engine: str, lost: Lost) -> None:
+        """Add light, node and channels as an engine renders them; a light that is never on is left out."""
         if not any(self.visible):
             return
-        _warn(self.name, self.data, lost)
+        _warn(self.name, self.data, engine, lost)
         if self.data.type == "SPOT" and self.stretched:
             lost.add(self.name, "spot with different scales", "its cone is round; apply the scale, or use an area light")
         values = {key: np.array([sample[key] for sample in self.values]) for key in self.values[0]}
         document.use_extension("KHR_lights_punctual")
         lights = document.root.setdefault("extensions", {}).setdefault("KHR_lights_punctual", {}).setdefault("lights", [])
         index = len(lights)
-        lights.append(self._light())
+        lights.append(self._light(engine))
         node: dict = {"name": self.name, "extensions": {"KHR_lights_punctual": {"light": index}}}
         number = document.append("nodes", node)
         animation.node(node, number, np.array(self.poses))
@@ -79,7 +79,7 @@ class LightTrack:
         else:
             animation.pointer(f"{pointer}/extras/area/size", np.stack([values["width"], values["height"]], axis=1))
 
-    def _light(self) -> dict:
+    def _light(self, engine: str) -> dict:
         first, kind = self.values[0], self.data.type
         light: dict = {
             "name": self.data.name,
@@ -98,7 +98,7 @@ class LightTrack:
             shape = "ellipse" if self.data.shape in ("DISK", "ELLIPSE") else "rectangle"
             light["extras"]["area"] = {"shape": shape, "size": [tidy(first["width"]), tidy(first["height"])]}
             light["spot"] = {"innerConeAngle": 0, "outerConeAngle": _HALF_PI}
-        if self.data.specular_factor != 1:
+        if _has_factors(engine) and self.data.specular_factor != 1:
             light["extras"]["specular"] = tidy(self.data.specular_factor)
         return light
 
@@ -168,10 +168,21 @@ def _is_plain(data: bpy.types.Light) -> bool:
     return shown is None or (shown.type == "EMISSION" and all(constant(shown.inputs[key]) is not None for key in ("Color", "Strength")))
 
 
-def _warn(name: str, data: bpy.types.Light, lost: Lost) -> None:
+def _has_factors(engine: str) -> bool:
+    """Whether an engine scales a light's shares of diffuse and specular light: Cycles does not."""
+    return engine != "CYCLES"
+
+
+def _warn(name: str, data: bpy.types.Light, engine: str, lost: Lost) -> None:
     """Name what a light has that is not carried."""
     if not _is_plain(data):
         lost.add(name, "light nodes (texture, IES or falloff)", "only plain colour and strength are carried; use the light's own settings")
+    if _has_factors(engine) and data.diffuse_factor != 1:
+        lost.add(
+            name,
+            f"diffuse factor {data.diffuse_factor:g}",
+            "it is 1 here; scale its layer, which is its part of the diffuse light, in compositing (--aov lights)",
+        )
     if data.type == "AREA" and data.spread < math.pi - 1e-3:
         lost.add(name, "area light spread", "it shines over the whole half space; use a spot light for a beam")
     if data.type == "SPOT" and data.spot_size > math.pi + 1e-3:

@@ -262,3 +262,13 @@ def test_other_light_nodes_are_named(blender, export, case):
     else:
         feed(emission.outputs[0].links[0].to_socket, "AddShader")
     assert export().lost_features("Light") == ["light nodes (texture, IES or falloff)"]
+
+
+@pytest.mark.parametrize("engine", ["CYCLES", "BLENDER_EEVEE"])
+def test_factors_of_a_light_are_those_of_the_engine(blender, export, engine):
+    blender.context.scene.render.engine = engine
+    make(blender, "POINT", specular_factor=0.0, diffuse_factor=0.5)
+    gltf = export()
+    followed = engine != "CYCLES"
+    assert gltf.light("Light")[1]["extras"].get("specular", 1) == (0 if followed else 1)
+    assert gltf.lost_features("Light") == (["diffuse factor 0.5"] if followed else [])
