@@ -168,7 +168,11 @@ def _bake(scene: bpy.types.Scene, ob: bpy.types.Object, slot: bpy.types.Material
             nodes.active = spare
     _only(scene, ob)
     ob.data.uv_layers.active = ob.data.uv_layers[_UV]
+    # Blender looks at the mesh's texture mesh only where a modifier is on it.
+    idle = ob.modifiers.new("idle", "SIMPLE_DEFORM")
+    idle.angle = 0
     bpy.ops.object.bake(type="EMIT", margin=4, use_clear=True, target="IMAGE_TEXTURES")
+    ob.modifiers.remove(idle)
     for nodes, spare, active in others:
         nodes.remove(spare)
         nodes.active = active

@@ -8,6 +8,7 @@ A mesh whose vertices or faces change in number becomes several meshes, each vis
 from __future__ import annotations
 
 import hashlib
+import math
 from dataclasses import dataclass, field
 
 import bpy
@@ -16,7 +17,8 @@ import numpy as np
 from ..common.morph import choose_targets
 from ..common.report import Lost
 from .materials import DEFORMED, default_surface, own_copy
-from .prepare import is_animated
+from .nodes import has_generated
+from .prepare import is_animated, still
 
 # Modifiers that may change what of a mesh is not its vertices' positions.
 _CHANGES_ATTRIBUTES = {"NODES", "UV_WARP", "UV_PROJECT", "DATA_TRANSFER"}
@@ -37,6 +39,7 @@ class Shape:
     name: str
     mesh: bpy.types.Mesh
     topology: bytes
+    source: bpy.types.Object
     # sample number -> vertex positions; empty for meshes that never change.
     poses: dict[int, np.ndarray] = field(default_factory=dict)
     # What its object is called in the export scene, and its mesh's place in the file.
@@ -131,8 +134,23 @@ class GeometryStore:
                     mesh.materials[i] = material
                 else:
                     mesh.materials.append(material)
-        self.shapes.append(Shape(ob.original.data.name if ob.original.data else ob.name, mesh, topology))
+        self.shapes.append(Shape(ob.original.data.name if ob.original.data else ob.name, mesh, topology, ob.original))
         return len(self.shapes) - 1
+
+    def undeform(self, scene: bpy.types.Scene, samples: np.ndarray) -> None:
+        """Take the generated coordinates of shapes from what they are without what deforms them; not called before all is sampled."""
+        found = [shape for shape in self.shapes if DEFORMED in shape.mesh and _has_generated(shape.mesh)]
+        for shape in found:
+            _rest(shape.source)
+        for shape in sorted(found, key=lambda shape: min(shape.poses)):
+            frame = samples[min(shape.poses)]
+            scene.frame_set(math.floor(frame), subframe=frame % 1)
+            mesh = shape.source.evaluated_get(bpy.context.evaluated_depsgraph_get()).data
+            # Geometry nodes show other meshes than that of their object.
+            if isinstance(mesh, bpy.types.Mesh) and _topology(mesh) == shape.topology:
+                shape.mesh.texco_mesh = mesh.copy()
+                shape.mesh.texco_mesh.use_auto_texspace = False
+                del shape.mesh[DEFORMED]
 
     def build(self, scene: bpy.types.Scene, samples: np.ndarray, override: bpy.types.Material | None) -> None:
         """Link one object for each shape into `scene`, with shape keys for its key poses.
@@ -186,6 +204,22 @@ def _is_deformed(ob: bpy.types.Object) -> bool:
     """Whether an object's mesh is bent out of the form that its generated coordinates are those of."""
     bent = any(modifier.type in _DEFORMS and modifier.show_render for modifier in ob.modifiers)
     return bent or ob.parent_type in _DEFORMING_PARENTS or getattr(ob.data, "shape_keys", None) is not None
+
+
+def _rest(ob: bpy.types.Object) -> None:
+    """Switch off what deforms an object's mesh."""
+    for modifier in ob.modifiers:
+        if modifier.type in _DEFORMS:
+            still(ob, f"{modifier.path_from_id()}.show_viewport")
+            modifier.show_viewport = False
+    if ob.parent_type in _DEFORMING_PARENTS:
+        ob.parent_type = "OBJECT"
+    if getattr(ob.data, "shape_keys", None) is not None:
+        ob.show_only_shape_key, ob.active_shape_key_index = True, 0
+
+
+def _has_generated(mesh: bpy.types.Mesh) -> bool:
+    return any(material is not None and material.node_tree is not None and has_generated(material.node_tree) for material in mesh.materials)
 
 
 def _fill_slots(mesh: bpy.types.Mesh, override: bpy.types.Material | None, made: dict[bpy.types.Material | None, bpy.types.Material]) -> None:

@@ -98,6 +98,8 @@ class _Export:
         sampler.run(*self.frames)
         name_scripts(self.lost)
         sky = [sky[i] for i in np.argsort(np.array(sampler.taken), kind="stable")]
+        if self.options.bake:
+            sampler.geometry.undeform(self.scene, np.array(sampler.taken))
         self.scene.frame_set(self.frames[0])
         self.options.progress(f"writing {len(sampler.geometry.shapes)} meshes")
         document = self._geometry(sampler)

@@ -90,8 +90,17 @@ def placed(socket: bpy.types.NodeSocket) -> str | None:
 
 def is_generated(socket: bpy.types.NodeSocket) -> bool:
     """Whether what is before an input depends on generated coordinates."""
-    nodes = [(out.node, out.name) for out in upstream(socket)]
-    return any((n.type == "TEX_COORD" and name == "Generated") or (n.type in _GENERATED and not n.inputs["Vector"].is_linked) for n, name in nodes)
+    return any(_takes_generated(out) for out in upstream(socket))
+
+
+def has_generated(tree: bpy.types.NodeTree) -> bool:
+    """Whether generated coordinates are used in a node tree."""
+    return any(_takes_generated(link.from_socket) for each in trees(tree) for link in each.links)
+
+
+def _takes_generated(out: bpy.types.NodeSocket) -> bool:
+    node = out.node
+    return (node.type == "TEX_COORD" and out.name == "Generated") or (node.type in _GENERATED and not node.inputs["Vector"].is_linked)
 
 
 def _is_placed(out: bpy.types.NodeSocket) -> bool:

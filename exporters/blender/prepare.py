@@ -43,7 +43,7 @@ def prepare(scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer) -> None:
     _show_layers(view_layer.layer_collection)
     _keep_unseen(scene, view_layer)
     for ob in bpy.data.objects:
-        _still(ob, "hide_viewport")
+        still(ob, "hide_viewport")
         ob.hide_viewport = ob.hide_render and not stays(ob)
         ob.show_instancer_for_viewport = ob.show_instancer_for_render
         for modifier in ob.modifiers:
@@ -136,7 +136,7 @@ def _is_render(tree: bpy.types.NodeTree) -> None:
         tree.links.new(tree.nodes.new("FunctionNodeInputBool").outputs[0], link.to_socket)
 
 
-def _still(ob: bpy.types.Object, path: str) -> None:
+def still(ob: bpy.types.Object, path: str) -> None:
     """Take the animation off a property that is about to be set."""
     data = ob.animation_data
     if data is None:
@@ -154,7 +154,7 @@ def _as_rendered(ob: bpy.types.Object, modifier: bpy.types.Modifier) -> None:
     for viewport, render in (("show_viewport", "show_render"), *_LEVELS):
         if not (hasattr(modifier, viewport) and hasattr(modifier, render)):
             continue
-        _still(ob, f"{owner}.{viewport}")
+        still(ob, f"{owner}.{viewport}")
         setattr(modifier, viewport, getattr(modifier, render))
         if _moves(ob, f"{owner}.{render}"):
             _follow(modifier, viewport, ob, f"{owner}.{render}")

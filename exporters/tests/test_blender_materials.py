@@ -226,18 +226,30 @@ def test_generated_coordinates_are_of_the_mesh_before_its_modifiers(blender, sur
     assert gltf.lost_features("Grey") == []
 
 
-@pytest.mark.parametrize("bent", ["modifier", "shape keys"])
-def test_generated_coordinates_of_a_deformed_mesh_are_named(blender, surface, export, bent):
+@pytest.mark.parametrize("bent", ["modifier", "shape key", "welded"])
+def test_generated_coordinates_are_of_the_mesh_before_it_is_deformed(blender, surface, export, bent):
+    import blender_scene as b
+
     ob = blender.data.objects["Square"]
     if bent == "modifier":
-        ob.modifiers.new("Modifier", "CAST")
+        ob.modifiers.new("Displace", "DISPLACE").direction = "X"
+        b.key(ob.modifiers[0], "strength", {1: 4, 2: 8})
     else:
         ob.shape_key_add(name="Basis")
+        key = ob.shape_key_add(name="Key")
+        key.value = 1
+        key.data[1].co.x += 2
+        key.data[2].co = key.data[1].co if bent == "welded" else (3, 1, 0)
+        ob.modifiers.new("Weld", "WELD")
     shine_by_generated(surface)
-    assert export(bake=16).lost_features("Grey") == ["emission color by generated coordinates of a mesh that is deformed"]
-    # A texture without coordinates has these.
+    # A texture that is given no coordinates takes these.
     link(node(surface, "TexNoise").outputs["Color"], surface.inputs["Base Color"])
-    assert export("noise.gltf", bake=16).lost_features("Grey")[0] == "base color by generated coordinates of a mesh that is deformed"
+    gltf = export(bake=64)
+    strength = material_of(gltf)["extensions"].get("KHR_materials_emissive_strength", {}).get("emissiveStrength", 1)
+    # Without the key there is another mesh.
+    lost = [f"{name} color by generated coordinates of a mesh that is deformed" for name in ("base", "emission") if bent == "welded"]
+    assert gltf.lost_features("Grey") == lost
+    assert strength == pytest.approx(2 if lost else 1, rel=0.05)
 
 
 def test_emission_strength_from_an_image_is_named_without_baking(blender, surface, export):
