@@ -105,10 +105,17 @@ impl Bounds {
         if start.is_finite() { start } else { 0.0 }
     }
 
-    /// Larger on all sides by the padding of a tree that reaches so far.
-    fn padded(self, reach: f32) -> Self {
-        let padding = Vec3::splat(reach * PADDING);
-        Self { min: self.min - padding, max: self.max + padding }
+    /// Larger on all sides by the padding of a tree that reaches so far, or up to twice that.
+    ///
+    /// By how much hangs on the box's number: among neighbours that are all equally near, as in a straight pipe or a row of lamps, the
+    /// builder takes the last, and so would join one pair only in each of its passes.
+    fn padded(self, reach: f32, number: u32) -> Self {
+        let bits = scrambled(number);
+        let padding = |first: u32| {
+            let more = Vec3::from([0, 5, 10].map(|shift| (bits >> (first + shift) & 31) as f32 / 32.0));
+            (Vec3::ONE + more) * (reach * PADDING)
+        };
+        Self { min: self.min - padding(0), max: self.max + padding(15) }
     }
 }
 
@@ -168,8 +175,8 @@ pub(super) fn build(bounds: &[Bounds], reach: f32, most: usize) -> Built {
         return Built::default();
     }
     // A horizon far away should not fatten what is near the middle.
-    let padded: Vec<Bounds> = bounds.iter().map(|b| b.padded(b.reach().max(reach / 64.0))).collect();
-    let boxes: Vec<Aabb> = padded.iter().map(|b| Aabb::new(b.min.into(), b.max.into())).collect();
+    let padded = bounds.iter().zip(0..).map(|(b, number)| b.padded(b.reach().max(reach / 64.0), number));
+    let boxes: Vec<Aabb> = padded.map(|b| Aabb::new(b.min.into(), b.max.into())).collect();
     let indices = (0..boxes.len() as u32).collect();
     let mut builder = PlocBuilder::with_capacity(boxes.len());
     let mut bvh2 = builder.build(PlocSearchDistance::Medium, &boxes, indices, SortPrecision::U64, 3);
@@ -178,8 +185,38 @@ pub(super) fn build(bounds: &[Bounds], reach: f32, most: usize) -> Built {
     Built { tree, order, leaves }
 }
 
+/// Bits that have nothing to do with those of the next number (Wellons' `lowbias32`).
+fn scrambled(number: u32) -> u32 {
+    let mut x = number;
+    x = (x ^ x >> 16).wrapping_mul(0x7feb_352d);
+    x = (x ^ x >> 15).wrapping_mul(0x846c_a68b);
+    x ^ x >> 16
+}
+
 fn has_area([a, b, c]: [Vec3; 3]) -> bool {
     let within = |p: Vec3| p.abs().cmple(Vec3::splat(MAX_COORDINATE)).all();
     let (a64, b64, c64) = (a.as_dvec3(), b.as_dvec3(), c.as_dvec3());
     within(a) && within(b) && within(c) && (b64 - a64).cross(c64 - a64).length_squared() > 0.0
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Entries that a traversal of the tree over such boxes has pending at most: seven for each level.
+    fn pending(bounds: impl Iterator<Item = Bounds>) -> usize {
+        let bounds: Vec<_> = bounds.collect();
+        let reach = bounds.iter().map(|b| b.reach()).fold(0.0, f32::max);
+        build(&bounds, reach, TrianglePack::MOST).tree.pending()
+    }
+
+    #[test]
+    fn boxes_in_a_row_or_at_one_place_make_no_chain() {
+        let at = |min: Vec3| Bounds { min, max: min + Vec3::splat(0.5) };
+        let count = 20_000u16;
+        let row = pending((0..count).map(|i| at(Vec3::X * f32::from(i))));
+        let heap = pending((0..count).map(|_| at(Vec3::ONE)));
+        // Evenly filled it takes five levels.
+        assert!(row < 7 * 20 && heap < 7 * 20, "{row} {heap}");
+    }
 }

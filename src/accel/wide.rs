@@ -29,6 +29,13 @@ pub(super) struct WideNode {
     children: [u32; 8],
 }
 
+/// A node of the binary tree that is still to be added, and where its number goes: a node and a place in that.
+struct Waiting {
+    place: usize,
+    depth: usize,
+    parent: Option<(usize, usize)>,
+}
+
 /// See the [module](self).
 #[derive(Default)]
 pub(super) struct WideTree {
@@ -80,6 +87,21 @@ impl SlabRay {
     }
 }
 
+impl WideNode {
+    /// Over up to eight nodes of the binary tree; its children are not known yet.
+    fn of(places: &[usize], leaves: &Leaves<'_>) -> Self {
+        let boxes: [Bounds; 8] = std::array::from_fn(|slot| {
+            places.get(slot).map_or(Bounds::default(), |&place| leaves.bounds(place))
+        });
+        let of = |corner: fn(&Bounds) -> Vec3, axis: usize| {
+            let values = boxes.each_ref().map(|b| corner(b)[axis]);
+            [Vec4::from_slice(&values[..4]), Vec4::from_slice(&values[4..])]
+        };
+        let bounds = std::array::from_fn(|axis| [of(|b| b.min, axis), of(|b| b.max, axis)]);
+        Self { bounds, children: [LEAF; 8] }
+    }
+}
+
 impl WideTree {
     /// The tree that `bvh` becomes with at most `most` primitives in a leaf; its primitives in the order of the leaves; and
     /// which of these are in each leaf, by number.
@@ -87,7 +109,7 @@ impl WideTree {
         let mut this = Self::default();
         let mut leaves = Leaves::new(bvh, most);
         if !bvh.nodes.is_empty() {
-            this.pending = 7 * this.add(0, &mut leaves) + 1;
+            this.pending = 7 * this.add_all(&mut leaves) + 1;
         }
         (this, leaves.order, leaves.ranges)
     }
@@ -101,28 +123,33 @@ impl WideTree {
         size_of_val(self.nodes.as_slice())
     }
 
-    /// Adds what is at or below a node of the binary tree as one node, and all below that; returns its depth.
-    fn add(&mut self, root: usize, leaves: &mut Leaves<'_>) -> usize {
-        let number = self.nodes.len();
-        self.nodes.push(WideNode { bounds: [[[Vec4::ZERO; 2]; 2]; 3], children: [LEAF; 8] });
-        let (places, count) = leaves.eight(root);
-        let (mut boxes, mut children, mut depth) = ([Bounds::default(); 8], [LEAF; 8], 0);
-        for (slot, &place) in places[..count].iter().enumerate() {
-            boxes[slot] = leaves.bounds(place);
-            if leaves.fits(place) {
-                children[slot] = LEAF | leaves.add(place);
+    /// Adds all nodes and leaves, each node before what is below it; returns the depth. Not by recursion: over boxes at one place
+    /// the tree may be a chain.
+    fn add_all(&mut self, leaves: &mut Leaves<'_>) -> usize {
+        let mut deepest = 0;
+        let mut waiting = vec![Waiting { place: 0, depth: 1, parent: None }];
+        while let Some(Waiting { place, depth, parent }) = waiting.pop() {
+            let child = if parent.is_some() && leaves.fits(place) {
+                LEAF | leaves.add(place)
             } else {
-                children[slot] = self.nodes.len() as u32;
-                depth = depth.max(self.add(place, leaves));
+                let number = self.nodes.len();
+                let (places, count) = leaves.eight(place);
+                let below = places[..count].iter().enumerate().rev();
+                let below = below.map(|(slot, &place)| Waiting {
+                    place,
+                    depth: depth + 1,
+                    parent: Some((number, slot)),
+                });
+                waiting.extend(below);
+                self.nodes.push(WideNode::of(&places[..count], leaves));
+                deepest = deepest.max(depth);
+                number as u32
+            };
+            if let Some((number, slot)) = parent {
+                self.nodes[number].children[slot] = child;
             }
         }
-        let of = |corner: fn(&Bounds) -> Vec3, axis: usize| {
-            let values: [f32; 8] = std::array::from_fn(|i| corner(&boxes[i])[axis]);
-            [Vec4::from_slice(&values[..4]), Vec4::from_slice(&values[4..])]
-        };
-        let bounds = std::array::from_fn(|axis| [of(|b| b.min, axis), of(|b| b.max, axis)]);
-        self.nodes[number] = WideNode { bounds, children };
-        depth + 1
+        deepest
     }
 
     /// Visits leaves along the ray, about the nearest first, as long as their boxes begin before `t_max`.
