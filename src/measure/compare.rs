@@ -80,7 +80,7 @@ pub const ENHANCED: f32 = 4.0;
 pub fn compare(sequence: &Path, reference: &Path, pictures: Option<&Path>) -> Result<Comparison> {
     let (own, others) = (list(sequence)?, list(reference)?);
     let names = [&own, &others].map(|of| of.keys().take(4).cloned().collect::<Vec<_>>().join(", "));
-    let (pairs, unmatched) = pair_up(own, others);
+    let (pairs, references, unmatched) = pair_up(own, others);
     if pairs.is_empty() {
         let [own, others] = names.map(|names| if names.is_empty() { "no EXR frames".into() } else { names });
         let message = format!(
@@ -89,11 +89,11 @@ pub fn compare(sequence: &Path, reference: &Path, pictures: Option<&Path>) -> Re
         );
         return Err(Error::input(sequence, "folder", message));
     }
-    let percentile = pairs
+    let percentile = references
         .par_iter()
-        .map(|pair| {
+        .map(|reference| {
             let mut percentile = Percentile::default();
-            percentile.add(&read_frame(&pair.reference)?.color);
+            percentile.add(&read_frame(reference)?.color);
             Ok(percentile)
         })
         .try_reduce(Percentile::default, |mut a, b| {
@@ -230,16 +230,20 @@ fn list(folder: &Path) -> Result<Sequences> {
     Ok(sequences)
 }
 
-/// Pairs frames; two folders with one sequence each are paired whatever the names.
-fn pair_up(mut sequence: Sequences, mut reference: Sequences) -> (Vec<Pair>, Unmatched) {
+/// Pairs frames; two folders with one sequence each are paired whatever the names. Also all files of the reference sequences of
+/// which there is a pair: a frame's exposure must not hang on which others have been rendered.
+fn pair_up(mut sequence: Sequences, mut reference: Sequences) -> (Vec<Pair>, Vec<PathBuf>, Unmatched) {
     if sequence.len() == 1 && reference.len() == 1 {
         sequence = sequence.into_values().map(|frames| (String::new(), frames)).collect();
         reference = reference.into_values().map(|frames| (String::new(), frames)).collect();
     }
-    let mut pairs = Vec::new();
+    let (mut pairs, mut references) = (Vec::new(), Vec::new());
     let mut unmatched = Unmatched::default();
     for (key, frames) in sequence {
         let mut counterparts = reference.remove(&key).unwrap_or_default();
+        if frames.keys().any(|frame| counterparts.contains_key(frame)) {
+            references.extend(counterparts.values().cloned());
+        }
         for (frame, path) in frames {
             match counterparts.remove(&frame) {
                 Some(reference) => pairs.push(Pair { frame, sequence: path, reference }),
@@ -249,7 +253,7 @@ fn pair_up(mut sequence: Sequences, mut reference: Sequences) -> (Vec<Pair>, Unm
         unmatched.reference.extend(counterparts.into_values().map(file_name));
     }
     unmatched.reference.extend(reference.into_values().flat_map(BTreeMap::into_values).map(file_name));
-    (pairs, unmatched)
+    (pairs, references, unmatched)
 }
 
 /// The table of `--format text`.

@@ -47,10 +47,10 @@ fn a_sequence_is_compared_frame_by_frame() {
 
     // The same by the functions on memory.
     let read = |folder: &Path, name: &str| read_frame(&folder.join(name)).unwrap().color;
-    let all: Vec<_> = (1..=4).map(|n| read(&b, &format!("other_{n:03}.exr"))).collect();
+    let all: Vec<_> = (0..=4).map(|n| read(&b, &format!("other_{n:03}.exr"))).collect();
     let exposure = Exposure::of(all.iter().map(Vec::as_slice));
     assert_eq!(exposure.scale, result.exposure);
-    assert_eq!(psnr(&read(&a, "walk.0004.exr"), &all[3], exposure), result.frames[3].error.psnr_db);
+    assert_eq!(psnr(&read(&a, "walk.0004.exr"), &all[4], exposure), result.frames[3].error.psnr_db);
 
     let json = serde_json::to_value(&result).unwrap();
     assert!(json["frames"][0]["psnr_db"].is_null());
@@ -67,6 +67,31 @@ fn a_sequence_is_compared_frame_by_frame() {
             && text.contains("only in the reference"),
         "{text}"
     );
+}
+
+#[test]
+fn a_frames_error_does_not_hang_on_the_frames_beside_it() {
+    let folder = tempfile::tempdir().unwrap();
+    let (a, b) = (folder.path().join("a"), folder.path().join("b"));
+    for number in 1..=3 {
+        let mut frame = plain(number, FrameKind::Traced);
+        frame.color.iter_mut().flatten().for_each(|value| *value *= (1 << number) as f32);
+        write(&b, &format!("walk.{number:04}.exr"), &frame);
+        frame.color[5][1] += 0.5;
+        write(&a, &format!("walk.{number:04}.exr"), &frame);
+    }
+    // Of another sequence nothing is compared.
+    let mut bright = plain(1, FrameKind::Traced);
+    bright.color.fill([1000.0; 4]);
+    write(&b, "other.0001.exr", &bright);
+    write(&a, "third.0001.exr", &bright);
+    let whole = compare(&a, &b, None).unwrap();
+    assert!(whole.exposure > 1e-3);
+    for name in ["walk.0002.exr", "walk.0003.exr"] {
+        fs::remove_file(a.join(name)).unwrap();
+    }
+    let part = compare(&a, &b, None).unwrap();
+    assert_eq!((part.exposure, &part.frames[..]), (whole.exposure, &whole.frames[..1]));
 }
 
 #[test]
