@@ -46,6 +46,7 @@ impl FrameLock {
         let mut file = Temporary::new(folder, PREFIX, SUFFIX).map_err(|e| explain(folder, &e))?;
         let claim = |file: &mut File| {
             file.try_lock()?;
+            let _ = open_to_all(file);
             file.write_all(names.join(SEPARATOR).as_bytes())?;
             // Other machines see what has reached the server.
             file.sync_all()
@@ -76,7 +77,7 @@ fn refuse_if_claimed(folder: &Path, names: &[String]) -> Result<()> {
         let file = match open_to_lock(&path) {
             // It may vanish while we look: its run has just ended.
             Err(e) if e.kind() == io::ErrorKind::NotFound => continue,
-            file => file.map_err(|e| explain(&path, &e))?,
+            file => file.map_err(|e| explain_lock(&path, &e))?,
         };
         // There are locks here, so what cannot be locked, whatever the reason, is taken to be held.
         if file.try_lock().is_ok() {
@@ -111,8 +112,7 @@ impl Register {
         }
         loop {
             let existed = path.exists();
-            let file = OpenOptions::new().write(true).create(true).truncate(false).open(&path);
-            let file = file.map_err(|e| explain(&path, &e))?;
+            let file = Self::open(&path).map_err(|e| explain_lock(&path, &e))?;
             match file.try_lock() {
                 // Whoever held it before has removed it: ours must be the file that is there now.
                 Ok(()) if is_at(&file, &path) => return Ok(Some(Self { _file: file, path })),
@@ -133,6 +133,18 @@ impl Register {
             }
         }
     }
+
+    /// Opens the file, or makes it. In a folder for all, some systems let nobody but its user open a file to make it.
+    fn open(path: &Path) -> io::Result<File> {
+        let made = OpenOptions::new().write(true).create(true).truncate(false).open(path);
+        match made {
+            Ok(file) => {
+                let _ = open_to_all(&file);
+                Ok(file)
+            }
+            Err(denied) => open_to_lock(path).map_err(|_| denied),
+        }
+    }
 }
 
 impl Drop for Register {
@@ -142,6 +154,29 @@ impl Drop for Register {
             let _ = fs::remove_file(&self.path);
         }
     }
+}
+
+/// Lets other users lock the file, whatever the mask of this process. Of their own files this fails, and need not be done.
+#[cfg(unix)]
+fn open_to_all(file: &File) -> io::Result<()> {
+    use std::os::unix::fs::PermissionsExt;
+    file.set_permissions(fs::Permissions::from_mode(0o666))
+}
+
+/// Elsewhere a file has the rights that its folder gives it.
+#[cfg(not(unix))]
+fn open_to_all(_: &File) -> io::Result<()> {
+    Ok(())
+}
+
+/// Why a file that locks the folder cannot be opened.
+fn explain_lock(path: &Path, error: &io::Error) -> Error {
+    if error.kind() == io::ErrorKind::PermissionDenied && path.exists() {
+        let message =
+            format!("{error}: another user's run has locked the folder; if it has ended, remove the file");
+        return Error::output(path, message);
+    }
+    explain(path, error)
 }
 
 /// True if the open `file` is the one named `path` now.

@@ -20,4 +20,6 @@ mod stage;
 mod stereo;
 mod trade;
 mod uncovered;
+#[cfg(unix)]
+mod users;
 mod whole;
