@@ -2,7 +2,7 @@
 
 use super::args::{CompressionArg, ConvertArgs};
 use super::existing::{
-    existing, place_of, prepare_report, refuse_input, refuse_report_of_another, remove_report,
+    existing, place_of, prepare_report, refuse_inputs, refuse_report_of_another, remove_report, report_files,
 };
 use super::interrupt::Interrupt;
 use super::job::{Job, stem, warn_of_ignored};
@@ -74,8 +74,10 @@ pub fn run(args: ConvertArgs) -> Result<ExitCode> {
     if !is_elsewhere {
         prepare_report(&report_path)?;
     }
-    let inputs = [Some(input), args.output.plan.as_ref(), args.scene.camera_from.as_ref()];
-    refuse_input(&report_path, inputs.into_iter().flatten().chain(&args.scene.geometry))?;
+    let mut inputs = job.scene.files.clone();
+    inputs.extend(args.output.plan.as_ref().and_then(|plan| plan.canonicalize().ok()));
+    let pictures = frames.iter().flat_map(|&f| pictures_of(f, &job.settings)).map(|id| folder.file_of(id));
+    refuse_inputs(pictures.chain(report_files(&report_path)), &inputs)?;
     if !args.output.overwrite {
         refuse_report_of_another(&report_path, input)?;
     }

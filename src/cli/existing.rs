@@ -7,7 +7,7 @@ use super::say;
 use anyhow::Result;
 use buzz::error::Error;
 use buzz::frame::FrameId;
-use buzz::output::{FrameFile, FrameRecord, OutputFolder, Report, SettingsHash};
+use buzz::output::{FrameFile, FrameRecord, OutputFolder, Report, Review, SettingsHash};
 use buzz::sequence::{Observer, Settings};
 use rayon::prelude::*;
 use std::collections::BTreeSet;
@@ -111,15 +111,20 @@ pub fn prepare_report(path: &Path) -> Result<()> {
     Ok(())
 }
 
-/// An error if the report would replace one of the files that the run reads.
-pub fn refuse_input<'a>(path: &Path, mut inputs: impl Iterator<Item = &'a PathBuf>) -> Result<()> {
-    let whole = |path: &Path| path.canonicalize().ok();
-    let own = whole(path);
-    let is_own = |input: &&PathBuf| own.is_some() && whole(input) == own;
-    match inputs.find(is_own) {
-        Some(input) => {
-            let message =
-                format!("--report {}: it is read by this run; give it another name", input.display());
+/// All files of the report at `path`: itself, its page, and what is in its folder for review.
+pub fn report_files(path: &Path) -> impl Iterator<Item = PathBuf> {
+    [path.to_path_buf(), path.with_extension("html")].into_iter().chain(Review::files(path))
+}
+
+/// An error if one of the `files` that the run writes is one of its `inputs` (canonical paths).
+pub fn refuse_inputs(mut files: impl Iterator<Item = PathBuf>, inputs: &BTreeSet<PathBuf>) -> Result<()> {
+    let is_input = |file: &PathBuf| file.canonicalize().is_ok_and(|file| inputs.contains(&file));
+    match files.find(is_input) {
+        Some(file) => {
+            let message = format!(
+                "{}: this run reads it, and would replace it; choose another folder, --name or --report",
+                file.display()
+            );
             Err(Error::Usage(message).into())
         }
         None => Ok(()),

@@ -5,7 +5,7 @@
 //! precision, and panics or underflows on broken files (POSITION as VEC2, a count of 0, a GLB length under 12).
 //! Working round it needs a validator as long as this reader, and would still not give the element's pointer.
 
-use super::uri;
+use super::uri::Folder;
 use crate::{Error, Result};
 use serde_json::{Map, Value};
 use std::{
@@ -18,8 +18,8 @@ use std::{
 pub(super) struct Document {
     /// As the user named it; for messages.
     pub file: PathBuf,
-    /// The folder that holds it: nothing outside is ever read.
-    pub folder: PathBuf,
+    /// The folder that holds it.
+    pub folder: Folder,
     /// The whole tree.
     root: Value,
     /// The GLB's binary chunk.
@@ -43,7 +43,7 @@ impl Document {
     /// Reads a `.gltf` or `.glb`; which one it is follows from the first bytes.
     pub fn read(file: &Path) -> Result<Self> {
         let bytes = read_file(file)?;
-        let folder = uri::folder_of(file)?;
+        let folder = Folder::of(file)?;
         let size = bytes.len();
         let (json, binary) =
             if bytes.starts_with(b"glTF") { split_glb(file, &bytes)? } else { (bytes.as_slice(), None) };

@@ -67,6 +67,7 @@ pub(super) fn read(
     scene.channels = animations.channels;
     scene.nodes = nodes.nodes;
     scene.ignored = notes.into_entries();
+    scene.files = document.folder.into_files();
     Ok(scene)
 }
 

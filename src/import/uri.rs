@@ -9,6 +9,8 @@ use base64::{
 };
 use percent_encoding::percent_decode_str;
 use std::{
+    cell::RefCell,
+    collections::BTreeSet,
     fs,
     path::{Component, Path, PathBuf},
 };
@@ -20,6 +22,29 @@ const BASE64: GeneralPurpose = GeneralPurpose::new(
         .with_decode_padding_mode(DecodePaddingMode::Indifferent)
         .with_decode_allow_trailing_bits(true),
 );
+
+/// The folder that a file is in, canonical: nothing outside is ever read.
+pub(super) struct Folder {
+    path: PathBuf,
+    /// The file, and all that were found.
+    files: RefCell<BTreeSet<PathBuf>>,
+}
+
+impl Folder {
+    /// The folder that holds `file`.
+    pub fn of(file: &Path) -> Result<Self> {
+        let parent = file.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
+        let real = |path| fs::canonicalize(path);
+        let failed = |e| Error::input(file, "folder", format!("cannot be read ({e})"));
+        let (path, file) = (real(parent).map_err(failed)?, real(file).map_err(failed)?);
+        Ok(Self { path, files: RefCell::new(BTreeSet::from([file])) })
+    }
+
+    /// What a scene is read from that is in it.
+    pub fn into_files(self) -> BTreeSet<PathBuf> {
+        self.files.into_inner()
+    }
+}
 
 /// Where a URI leads.
 pub(super) enum Source {
@@ -66,8 +91,8 @@ pub(super) fn resolve(document: &Document, uri: &str, place: &str) -> Result<Sou
     source.map_err(|why| document.error(place, why))
 }
 
-/// The file `path` in `folder` or below, or why it will not be read. `folder` is canonical.
-pub(super) fn in_folder(folder: &Path, path: &str) -> Result<Source, String> {
+/// The file `path` in `folder` or below, or why it will not be read.
+pub(super) fn in_folder(folder: &Folder, path: &str) -> Result<Source, String> {
     if has_scheme(path) { Err(refusal(path, SCHEME)) } else { below(folder, path) }
 }
 
@@ -86,7 +111,7 @@ fn has_scheme(text: &str) -> bool {
 }
 
 /// [`in_folder`] for a path that may have colons.
-fn below(folder: &Path, path: &str) -> Result<Source, String> {
+fn below(folder: &Folder, path: &str) -> Result<Source, String> {
     // Windows tools write back-slashes; on other systems they would be part of the name.
     let path = path.replace('\\', "/");
     let refuse = |why: &str| Err(refusal(&path, why));
@@ -102,15 +127,13 @@ fn below(folder: &Path, path: &str) -> Result<Source, String> {
             return refuse("leaves the folder");
         }
     }
-    let full = folder.join(&path);
+    let full = folder.path.join(&path);
     let Ok(real) = fs::canonicalize(&full) else { return Ok(Source::Missing(full)) };
-    if real.starts_with(folder) { Ok(Source::File(real)) } else { refuse("is a link that leaves the folder") }
-}
-
-/// The folder that holds `file`, canonical.
-pub(super) fn folder_of(file: &Path) -> Result<PathBuf> {
-    let parent = file.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    fs::canonicalize(parent).map_err(|e| Error::input(file, "folder", format!("cannot be read ({e})")))
+    if !real.starts_with(&folder.path) {
+        return refuse("is a link that leaves the folder");
+    }
+    folder.files.borrow_mut().insert(real.clone());
+    Ok(Source::File(real))
 }
 
 /// The bytes of `[<type>][;base64],<data>`.

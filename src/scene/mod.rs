@@ -32,7 +32,10 @@ pub use shape::{Quadric, Shape};
 pub use texture::{ColorSpace, Image, TextureRef, Wrap};
 pub use timing::{Cut, Rational, Timing};
 
-/// Everything to render, resolved: no references to files, every index in range, parents before children.
+use std::collections::BTreeSet;
+use std::path::PathBuf;
+
+/// Everything to render, resolved: all that files held is in memory, every index in range, parents before children.
 #[derive(Debug, Clone, Default)]
 pub struct Scene {
     /// The scene's name, for reports.
@@ -63,6 +66,8 @@ pub struct Scene {
     pub cuts: Vec<Cut>,
     /// What the input holds and the renderer leaves out.
     pub ignored: Vec<Ignored>,
+    /// The files that it was read from, canonical.
+    pub files: BTreeSet<PathBuf>,
 }
 
 /// A feature of the input that will not be rendered.

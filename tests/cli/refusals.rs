@@ -128,6 +128,33 @@ fn output_that_cannot_be_written_is_refused_with_4() {
 }
 
 #[test]
+fn a_picture_of_the_scenes_is_not_replaced_by_a_frame() {
+    let (folder, _) = fresh();
+    let place = folder.path();
+    let sky = place.join("sky.0001.exr");
+    exr::prelude::write_rgb_file(&sky, 4, 2, |_, _| (0.2, 0.3, 0.5)).unwrap();
+    let mut stage = Stage::drifting(4);
+    stage.json["scenes"][0]["extras"] = serde_json::json!({"buzz": {"world": {"image": "sky.0001.exr"}}});
+    let scene = stage.write(&place.join("sky.gltf"));
+    let before = (fs::read(&sky).unwrap(), listing(place));
+    for options in ["--skip-existing", "--overwrite", ""] {
+        run(&scene, place, &format!("-r 32x18 {options}"))
+            .refused(2, &["sky.0001.exr", "reads it", "--name"]);
+    }
+    assert_eq!(listing(place), before.1);
+    run(&scene, place, "-r 32x18 -f 0").ok();
+    assert_eq!(fs::read(&sky).unwrap(), before.0);
+    // What stands in the folder for review is no less an input.
+    let review = place.join("r.review");
+    fs::create_dir(&review).unwrap();
+    fs::rename(&sky, review.join("sheet.png")).unwrap();
+    stage.json["scenes"][0]["extras"]["buzz"]["world"]["image"] = "r.review/sheet.png".into();
+    stage.write(&scene);
+    let report = format!("-r 32x18 -f 2 --report {}", place.join("r.json").display());
+    run(&scene, place, &report).refused(2, &["sheet.png", "--report"]);
+}
+
+#[test]
 fn what_is_ignored_is_said_once_and_refused_if_strict() {
     let (folder, out) = fresh();
     let mut stage = Stage::drifting(3);

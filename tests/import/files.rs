@@ -54,7 +54,10 @@ fn files_beside_the_scene_are_found_by_their_percent_encoded_names() {
     for uri in ["a%20b/m%C3%A4sh.bin", "./a b/../a%20b/mäsh.bin", "a b\\mäsh.bin"] {
         gltf.json["buffers"] = json!([{"byteLength": gltf.bytes.len(), "uri": uri}]);
         fs::write(&file, gltf.text()).unwrap();
-        import(&file, &ImportOptions::default()).unwrap_or_else(|e| panic!("{uri}: {e}"));
+        let scene = import(&file, &ImportOptions::default()).unwrap_or_else(|e| panic!("{uri}: {e}"));
+        let read =
+            ["a b/mäsh.bin", "scene.gltf"].map(|name| folder.path().join(name).canonicalize().unwrap());
+        assert_eq!(scene.files, read.into());
     }
 }
 

@@ -69,6 +69,8 @@ fn an_obj_is_rendered_through_another_files_camera() {
     assert!(material.base_color_texture.is_some());
     assert_eq!(scene.meshes[0].uvs[0][0], Vec2::new(0.0, 1.0));
     assert!(scene.ignored.is_empty(), "{:?}", scene.ignored);
+    let read = ["a.mtl", "a.obj", "cam.gltf", "wood.png"].map(|name| at(name).canonicalize().unwrap());
+    assert_eq!(scene.files, read.into());
     // As additional geometry of the glTF file, its own triangle stays.
     let options = ImportOptions { geometry: vec![at("a.obj"), at("a.obj")], ..ImportOptions::default() };
     let scene = import(&at("cam.gltf"), &options).unwrap();

@@ -4,7 +4,7 @@ use super::{
     super::{
         document::read_file,
         ignored::Notes,
-        uri::{self, Source},
+        uri::{self, Folder, Source},
     },
     lines::{decode, split, statements},
 };
@@ -18,7 +18,7 @@ pub(super) struct Libraries<'a> {
     /// The OBJ file.
     pub file: &'a Path,
     /// Its folder.
-    pub folder: &'a Path,
+    pub folder: &'a Folder,
     pub notes: &'a Notes,
     /// One of them could not be had.
     pub incomplete: Cell<bool>,

@@ -9,7 +9,7 @@ mod statement;
 mod survey;
 mod textures;
 
-use super::{budget::Pictures, document::read_file, ignored::Notes, uri};
+use super::{budget::Pictures, document::read_file, ignored::Notes, uri::Folder};
 use crate::{
     Result,
     scene::{Instance, Node, Scene},
@@ -33,7 +33,7 @@ const OPTIONS: tobj::LoadOptions =
 pub(super) fn add(file: &Path, pictures: &Pictures, scene: &mut Scene) -> Result<()> {
     let notes = Notes::default();
     let bytes = read_file(file)?;
-    let folder = uri::folder_of(file)?;
+    let folder = Folder::of(file)?;
     let text = lines::decode(&bytes);
     let survey = Survey::of(file, &text, &notes)?;
     let libraries = Libraries { file, folder: &folder, notes: &notes, incomplete: Cell::new(false) };
@@ -84,6 +84,7 @@ pub(super) fn add(file: &Path, pictures: &Pictures, scene: &mut Scene) -> Result
             scene.instances.push(Instance { node, mesh: mesh_index, skin: None, node_from_object, object });
         }
     }
+    scene.files.extend(folder.into_files());
     let of_others = scene.ignored.len();
     for entry in notes.into_entries() {
         if !scene.ignored[..of_others].contains(&entry) {

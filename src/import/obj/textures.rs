@@ -6,7 +6,7 @@ use super::{
         document::read_file,
         ignored::Notes,
         image,
-        uri::{self, Source},
+        uri::{self, Folder, Source},
     },
     statement::Statement,
 };
@@ -18,12 +18,12 @@ use ::image::{
     GrayImage, Luma, Rgba, RgbaImage,
     imageops::{self, FilterType},
 };
-use std::{collections::HashMap, path::Path};
+use std::collections::HashMap;
 
 /// Loads pictures, each once for each use.
 pub(super) struct Textures<'a> {
     /// The folder that holds them.
-    pub folder: &'a Path,
+    pub folder: &'a Folder,
     /// What they may take.
     pub pictures: &'a Pictures,
     pub notes: &'a Notes,

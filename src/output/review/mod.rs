@@ -14,7 +14,7 @@ use crate::measure::picture::{contact_sheet, png};
 use crate::scene::Rational;
 use crate::{Error, Result};
 use std::collections::BTreeSet;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// A sequence to be looked at.
 #[derive(Debug)]
@@ -47,22 +47,27 @@ pub struct Review<'a> {
 const SHEET: (usize, usize) = (24, 6);
 
 impl Review<'_> {
+    /// The files of the folder that belongs to the report `report`: timeline, scripts for Nuke and Blender, contact sheet.
+    pub fn files(report: &Path) -> [PathBuf; 4] {
+        ["timeline.otio", "nuke.nk", "blender.py", "sheet.png"]
+            .map(|name| report.with_extension("review").join(name))
+    }
+
     /// Writes the folder that belongs to the report `report`.
     ///
     /// # Errors
     /// [`Error::Output`].
     pub fn write(&self, report: &Path, thumbnails: &Thumbnails) -> Result<()> {
         let (Some(&first), Some(&last)) = (self.frames.first(), self.frames.last()) else { return Ok(()) };
-        let folder = report.with_extension("review");
+        let [timeline, nuke, blender, sheet] = Self::files(report);
         let base = self.base(report)?;
-        write_alone(&folder.join("timeline.otio"), self.timeline(&base).as_bytes())?;
-        write_alone(&folder.join("nuke.nk"), self.nuke_script(&base, first, last).as_bytes())?;
-        write_alone(&folder.join("blender.py"), self.blender_script(&base, first, last).as_bytes())?;
+        write_alone(&timeline, self.timeline(&base).as_bytes())?;
+        write_alone(&nuke, self.nuke_script(&base, first, last).as_bytes())?;
+        write_alone(&blender, self.blender_script(&base, first, last).as_bytes())?;
         let pictures: Vec<_> = thumbnails.beauties(SHEET.0).into_values().collect();
         let Some(width) = pictures.first().map(image::RgbImage::width) else { return Ok(()) };
-        let path = folder.join("sheet.png");
-        let sheet = png(&contact_sheet(&pictures, SHEET.1, width));
-        write_alone(&path, &sheet.map_err(|e| Error::output(&path, e.to_string()))?)
+        let picture = png(&contact_sheet(&pictures, SHEET.1, width));
+        write_alone(&sheet, &picture.map_err(|e| Error::output(&sheet, e.to_string()))?)
     }
 
     /// The frames' folder as seen from the review's, with a slash at its end: `../`, unless the report was sent elsewhere.
