@@ -98,16 +98,25 @@ pub fn prepare_report(path: &Path) -> Result<()> {
             format!("--report {}: expected a .json file; a page is written beside it", path.display());
         return Err(Error::Usage(message).into());
     }
-    for file in [path.to_path_buf(), path.with_extension("html")] {
+    let files: Vec<PathBuf> = report_files(path).collect();
+    prepare_files(&files, "give --report another name")
+}
+
+/// Finds out that one of `files` cannot be written. Makes nothing: the folders that they are in may be needed by no file.
+pub fn prepare_files(files: &[PathBuf], advice: &str) -> Result<()> {
+    let mut probed = BTreeSet::new();
+    for file in files {
         if file.is_dir() {
-            let message =
-                "is a folder, where the report is to be; move it away, or give --report another name";
+            let message = format!("is a folder, where a file is to be written; move it away, or {advice}");
             return Err(Error::output(file, message).into());
         }
+        let (folder, _) = place_of(file);
+        let there = folder.ancestors().find(|path| path.exists()).unwrap_or(Path::new("."));
+        if probed.insert(there) {
+            tempfile::tempfile_in(there)
+                .map_err(|e| Error::output(file, format!("it cannot be written there ({e}); {advice}")))?;
+        }
     }
-    let (folder, _) = place_of(path);
-    let made = std::fs::create_dir_all(folder).and_then(|()| tempfile::tempfile_in(folder));
-    made.map_err(|e| Error::output(path, format!("the report cannot be written there ({e})")))?;
     Ok(())
 }
 
@@ -131,24 +140,28 @@ pub fn refuse_inputs(mut files: impl Iterator<Item = PathBuf>, inputs: &BTreeSet
     }
 }
 
-/// An error if something stands at `path` that would be lost: a report of a file of another name than `input`, or JSON that is no
-/// report. What is not even whole is nobody's.
+/// True if `file` is anything but empty or a file that has our `mark` in it, whatever else that is.
+pub fn is_anothers(file: &Path, mark: &str) -> bool {
+    let Ok(found) = std::fs::metadata(file) else { return false };
+    // To open a pipe would wait for whoever writes to it.
+    let bytes = if found.is_file() { std::fs::read(file).ok() } else { None };
+    let has_mark = |bytes: &[u8]| bytes.windows(mark.len()).any(|part| part == mark.as_bytes());
+    bytes.is_none_or(|bytes| !bytes.is_empty() && !has_mark(&bytes))
+}
+
+/// An error if something stands at `path` that would be lost: a report of a file of another name than `input`, or what is no
+/// report; or no page, where the page would be.
 pub fn refuse_report_of_another(path: &Path, input: &Path) -> Result<()> {
-    let Some(report) = Report::read(path) else {
-        let page = path.with_extension("html");
-        if std::fs::read_to_string(&page).is_ok_and(|text| !text.contains("Buzz report")) {
-            let message =
-                "is no page of this program; give --report another name, or --overwrite to replace it";
-            return Err(Error::output(page, message).into());
+    let page = path.with_extension("html");
+    for (file, mark, what) in [(path, "buzz-report/", "report"), (&page, "Buzz report", "page")] {
+        if is_anothers(file, mark) {
+            let message = format!(
+                "is no {what} of this program; give --report another name, or --overwrite to replace it"
+            );
+            return Err(Error::output(file, message).into());
         }
-        let bytes = std::fs::read(path).unwrap_or_default();
-        if serde_json::from_slice::<serde_json::Value>(&bytes).is_err() {
-            return Ok(());
-        }
-        let message =
-            "is no report of this program; give --report another name, or --overwrite to replace it";
-        return Err(Error::output(path, message).into());
-    };
+    }
+    let Some(report) = Report::read(path) else { return Ok(()) };
     // In a report names are text.
     if Path::new(&report.input).file_name() == Path::new(&*input.to_string_lossy()).file_name() {
         return Ok(());

@@ -295,7 +295,7 @@ fn truncated_and_foreign_files_are_not_taken_for_frames() {
 #[test]
 fn foreign_reports_and_temporary_files_are_left_alone_or_replaced() {
     let (_folder, scene, out, whole) = rendered();
-    fs::write(out.join("report.json"), "{").unwrap();
+    fs::write(out.join("report.json"), "").unwrap();
     fs::write(out.join("report.old.json"), "[1, 2]").unwrap();
     fs::write(out.join(".s.0001.exr.4711.tmp"), "half a frame of a run that was killed").unwrap();
     fs::write(out.join(".somebody.else.tmp"), "not ours").unwrap();

@@ -121,6 +121,13 @@ fn output_that_cannot_be_written_is_refused_with_4() {
     let report = folder.path().join("r.json");
     fs::create_dir(&report).unwrap();
     run(&scene, &out, &format!("-r 8x8 --report {}", report.display())).refused(4, &["r.json", "folder"]);
+    let review = folder.path().join("q.review");
+    fs::write(&review, "").unwrap();
+    let with_review = format!("-r 8x8 --report {}", folder.path().join("q.json").display());
+    run(&scene, &out, &with_review).refused(4, &["q.review", "--report"]);
+    fs::remove_file(&review).unwrap();
+    fs::create_dir_all(review.join("sheet.png")).unwrap();
+    run(&scene, &out, &with_review).refused(4, &["sheet.png", "folder"]);
     assert!(!out.exists(), "it was found out before the rendering: {:?}", listing(&out));
     // The folder in the way of a frame is named, too.
     fs::create_dir_all(out.join("s.0001.exr/x")).unwrap();

@@ -139,8 +139,20 @@ fn a_name_that_is_no_text_is_known_again() {
 #[test]
 fn a_page_of_somebody_elses_stays() {
     let (_folder, scene, out) = rendered();
-    fs::write(out.join("index.html"), "<h1>Shot 12</h1>").unwrap();
     let report = format!("--skip-existing --report {}", out.join("index.json").display());
-    again(&scene, &out, &report).refused(4, &["index.html", "--report"]);
-    assert_eq!(fs::read_to_string(out.join("index.html")).unwrap(), "<h1>Shot 12</h1>");
+    let files: [(&str, &[u8]); 4] = [
+        ("index.html", b"<h1>Shot 12</h1>"),
+        ("index.html", b"<h1>Caf\xe9</h1>"),
+        ("index.json", b"{\"look\": 2} // of the grade"),
+        ("index.json", b"\xef\xbb\xbf{\"look\": 2}"),
+    ];
+    for (name, text) in files {
+        fs::write(out.join(name), text).unwrap();
+        again(&scene, &out, &report).refused(4, &[name, "--report"]);
+        assert_eq!(fs::read(out.join(name)).unwrap(), text);
+        fs::remove_file(out.join(name)).unwrap();
+    }
+    fs::write(out.join("index.json"), "").unwrap();
+    again(&scene, &out, &report).ok();
+    again(&scene, &out, &report).ok();
 }
