@@ -1,7 +1,7 @@
 //! `buzz-convert trade`: what each quality costs and what it gets wrong.
 
 use super::args::{ProgressArg, QualityArg, TradeArgs};
-use super::existing::prepare_report;
+use super::existing::{is_anothers, prepare_files};
 use super::interrupt::Interrupt;
 use super::job::{Job, warn_of_ignored};
 use super::{memory, parse, say};
@@ -25,7 +25,7 @@ pub fn run(args: TradeArgs) -> Result<ExitCode> {
     let mut job = Job::new(&args.input, &args.scene, &args.render, QualityArg::Full, None)?;
     warn_of_ignored(&job.scene);
     memory::refuse_uncountable(&job.settings)?;
-    prepare_report(&args.out_dir.join("trade.json"))?;
+    prepare(&args.out_dir)?;
     memory::refuse_planning_over(None, &job)?;
     let mut candidates = Vec::new();
     for &quality in QualityArg::value_variants() {
@@ -50,15 +50,36 @@ pub fn run(args: TradeArgs) -> Result<ExitCode> {
     let Job { scene, accel, .. } = &mut job;
     let result = trade(&input, scene, accel, &candidates, &spans, &mut watch)?;
     let table = result.to_string();
-    write(&result, &table, &args.out_dir)?;
+    // First: whatever becomes of the files, it has taken long.
     say::result(&table)?;
+    write(&result, &table, &args.out_dir)?;
     Ok(ExitCode::SUCCESS)
+}
+
+/// The files, and what each of them has in it.
+const FILES: [(&str, &str); 4] = [
+    ("trade.txt", "segments measured: "),
+    ("trade.json", "buzz-trade/"),
+    ("trade.csv", "quality,frame,from,"),
+    ("trade.html", "What each quality costs"),
+];
+
+/// Finds out before the measurement, not after it, that its files cannot be written, or would replace somebody's.
+fn prepare(folder: &Path) -> Result<()> {
+    let files = FILES.map(|(name, _)| folder.join(name));
+    prepare_files(&files, "choose another folder")?;
+    for (file, (_, mark)) in files.into_iter().zip(FILES) {
+        if is_anothers(&file, mark) {
+            let message = "is no file of trade's; choose another folder, or move it away";
+            return Err(Error::output(file, message).into());
+        }
+    }
+    Ok(())
 }
 
 fn write(trade: &Trade, table: &str, folder: &Path) -> Result<()> {
     let (json, csv, html) = (serde_json::to_string_pretty(trade)? + "\n", trade.csv(), trade.html());
-    let files = [("trade.txt", table), ("trade.json", &json), ("trade.csv", &csv), ("trade.html", &html)];
-    for (name, text) in files {
+    for ((name, _), text) in FILES.into_iter().zip([table, &json, &csv, &html]) {
         write_alone(&folder.join(name), text.as_bytes())?;
     }
     Ok(())

@@ -3,6 +3,7 @@
 use crate::rig::{buzz, courtyard, fresh, json, listing, run};
 use crate::stage::Stage;
 use serde_json::Value;
+use std::fs;
 
 fn trade(arguments: &[&str]) -> crate::rig::Outcome {
     buzz(["trade"].iter().chain(arguments))
@@ -117,6 +118,27 @@ fn frames_that_are_not_there_are_a_usage_error() {
     let scene = Stage::drifting(4).write(&folder.path().join("s.gltf"));
     let arguments = [scene.to_str().unwrap(), out.to_str().unwrap(), "-r", "16x9", "-f", "500"];
     trade(&arguments).refused(2, &["--frames 500", "0-3"]);
+    assert!(!out.exists());
+}
+
+#[test]
+fn files_that_cannot_be_replaced_are_found_out_before_the_measurement() {
+    let (folder, out) = fresh();
+    let scene = Stage::drifting(4).write(&folder.path().join("s.gltf"));
+    let measure = || trade(&[scene.to_str().unwrap(), out.to_str().unwrap(), "-r", "16x9"]);
+    for name in ["trade.txt", "trade.json", "trade.csv", "trade.html"] {
+        fs::create_dir_all(out.join(name)).unwrap();
+        measure().refused(4, &[name, "folder"]);
+        fs::remove_dir(out.join(name)).unwrap();
+        fs::write(out.join(name), "Sold: 12 shares").unwrap();
+        measure().refused(4, &[name, "another folder"]);
+        assert_eq!(fs::read_to_string(out.join(name)).unwrap(), "Sold: 12 shares");
+        fs::remove_file(out.join(name)).unwrap();
+    }
+    fs::remove_dir(&out).unwrap();
+    measure().ok();
+    // Its own files are replaced.
+    measure().ok();
 }
 
 #[test]
