@@ -93,7 +93,7 @@ pub struct CompareArgs {
     /// Exit with 1 if any frame's PSNR is under this.
     #[arg(long, value_name = "DB", allow_negative_numbers = true)]
     pub fail_below: Option<f64>,
-    /// Write a PNG a frame there: the frame, its reference, and their difference times 4.
+    /// Write a PNG a frame there: the frame, its reference, and their difference times 4. Replaces those of before.
     #[arg(long, value_name = "FOLDER")]
     pub differences: Option<PathBuf>,
 }

@@ -7,7 +7,7 @@ use super::say;
 use anyhow::Result;
 use buzz::error::Error;
 use buzz::frame::FrameId;
-use buzz::output::{FrameFile, FrameRecord, OutputFolder, Report, Review, SettingsHash};
+use buzz::output::{FrameFile, FrameRecord, OutputFolder, Report, Review, SettingsHash, is_anothers};
 use buzz::sequence::{Observer, Settings};
 use rayon::prelude::*;
 use std::collections::BTreeSet;
@@ -138,15 +138,6 @@ pub fn refuse_inputs(mut files: impl Iterator<Item = PathBuf>, inputs: &BTreeSet
         }
         None => Ok(()),
     }
-}
-
-/// True if `file` is anything but empty or a file that has our `mark` in it, whatever else that is.
-pub fn is_anothers(file: &Path, mark: &str) -> bool {
-    let Ok(found) = std::fs::metadata(file) else { return false };
-    // To open a pipe would wait for whoever writes to it.
-    let bytes = if found.is_file() { std::fs::read(file).ok() } else { None };
-    let has_mark = |bytes: &[u8]| bytes.windows(mark.len()).any(|part| part == mark.as_bytes());
-    bytes.is_none_or(|bytes| !bytes.is_empty() && !has_mark(&bytes))
 }
 
 /// An error if something stands at `path` that would be lost: a report of a file of another name than `input`, or what is no

@@ -1,14 +1,14 @@
 //! `buzz-convert trade`: what each quality costs and what it gets wrong.
 
 use super::args::{ProgressArg, QualityArg, TradeArgs};
-use super::existing::{is_anothers, prepare_files};
+use super::existing::prepare_files;
 use super::interrupt::Interrupt;
 use super::job::{Job, warn_of_ignored};
 use super::{memory, parse, say};
 use anyhow::{Context, Result};
 use buzz::error::Error;
 use buzz::measure::trade::{Candidate, TRUTH_BYTES_PER_PIXEL, Trade, Watch, sample, trade};
-use buzz::output::write_alone;
+use buzz::output::{is_anothers, write_alone};
 use buzz::sequence::Quality;
 use clap::ValueEnum;
 use std::path::Path;

@@ -4,7 +4,7 @@ use super::{
     Exposure, ImageError, Percentile, Place, ReadFrame, compare_pictures, picture, read_frame, worst_place,
 };
 use crate::frame::FrameKind;
-use crate::output::number_in_name;
+use crate::output::{is_anothers, number_in_name};
 use crate::{Error, Result};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
@@ -76,7 +76,7 @@ pub const ENHANCED: f32 = 4.0;
 ///
 /// # Errors
 /// [`Error::Input`] if a folder or file cannot be read, if no frame has a counterpart, or if a pair's data windows differ;
-/// [`Error::Output`] if a picture cannot be written.
+/// [`Error::Output`] if a picture cannot be written, or would replace one that is not of this program.
 pub fn compare(sequence: &Path, reference: &Path, pictures: Option<&Path>) -> Result<Comparison> {
     let (own, others) = (list(sequence)?, list(reference)?);
     let names = [&own, &others].map(|of| of.keys().take(4).cloned().collect::<Vec<_>>().join(", "));
@@ -88,6 +88,15 @@ pub fn compare(sequence: &Path, reference: &Path, pictures: Option<&Path>) -> Re
             reference.display()
         );
         return Err(Error::input(sequence, "folder", message));
+    }
+    if let Some(folder) = pictures {
+        for file in pairs.iter().map(|pair| pair.picture_in(folder)) {
+            if is_anothers(&file, picture::MARK) {
+                let message = "is there already, and no picture of this program; choose another folder";
+                return Err(Error::output(file, message));
+            }
+        }
+        std::fs::create_dir_all(folder).map_err(|e| Error::output(folder, e.to_string()))?;
     }
     let percentile = references
         .par_iter()
@@ -101,9 +110,6 @@ pub fn compare(sequence: &Path, reference: &Path, pictures: Option<&Path>) -> Re
             Ok(a)
         })?;
     let exposure = Exposure::from_p99(percentile.get(0.99));
-    if let Some(folder) = pictures {
-        std::fs::create_dir_all(folder).map_err(|e| Error::output(folder, e.to_string()))?;
-    }
     let errors: Result<Vec<_>> = pairs.par_iter().map(|pair| pair.compare(exposure, pictures)).collect();
     let (frames, inferred): (Vec<_>, Vec<_>) = errors?.into_iter().unzip();
 
@@ -163,8 +169,11 @@ impl Pair {
             picture::difference(&a.color, &b.color, width, exposure, ENHANCED),
         ];
         let parts: Vec<_> = parts.into_iter().flatten().collect();
-        let file = folder.join(file_name(&self.sequence)).with_extension("png");
-        picture::write_png(&picture::contact_sheet(&parts, 3, width), &file)
+        picture::write_png(&picture::contact_sheet(&parts, 3, width), &self.picture_in(folder))
+    }
+
+    fn picture_in(&self, folder: &Path) -> PathBuf {
+        folder.join(file_name(&self.sequence)).with_extension("png")
     }
 }
 

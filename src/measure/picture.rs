@@ -1,7 +1,7 @@
 //! Frames as pictures for screens and documentation.
 
 use super::Exposure;
-use crate::output::write_whole;
+use crate::output::write_alone;
 use crate::{Error, Result};
 use image::imageops::{self, FilterType};
 use image::{ImageFormat, Rgb, RgbImage};
@@ -100,15 +100,26 @@ pub fn scale(picture: &RgbImage, width: u32) -> RgbImage {
     imageops::resize(picture, width, height, filter)
 }
 
-/// The picture as the bytes of a PNG file.
+/// What all our PNG files have in them: the keyword and text of a `tEXt` chunk.
+pub const MARK: &str = "Software\0Buzz";
+
+/// The picture as the bytes of a PNG file that says who made it.
 ///
 /// # Errors
 /// If the picture is empty or too large for the format.
 pub fn png(picture: &RgbImage) -> image::ImageResult<Vec<u8>> {
     let mut bytes = Cursor::new(Vec::new());
     picture.write_to(&mut bytes, ImageFormat::Png)?;
-    Ok(bytes.into_inner())
+    let mut bytes = bytes.into_inner();
+    let content = ["tEXt", MARK].concat().into_bytes();
+    let checksum = zlib_rs::crc32::crc32(0, &content).to_be_bytes();
+    let chunk = [&(MARK.len() as u32).to_be_bytes()[..], &content, &checksum].concat();
+    bytes.splice(BEHIND_HEADER..BEHIND_HEADER, chunk);
+    Ok(bytes)
 }
+
+/// Where the second chunk of a PNG file begins: signature and header have a fixed length.
+const BEHIND_HEADER: usize = 8 + 25;
 
 /// Writes the picture as a PNG file, whole or not at all.
 ///
@@ -116,7 +127,7 @@ pub fn png(picture: &RgbImage) -> image::ImageResult<Vec<u8>> {
 /// [`Error::Output`] if the file cannot be written or the picture is empty.
 pub fn write_png(picture: &RgbImage, path: &Path) -> Result<()> {
     let bytes = png(picture).map_err(|e| Error::output(path, e.to_string()))?;
-    write_whole(path, [bytes.as_slice()])
+    write_alone(path, &bytes)
 }
 
 fn draw<T>(values: &[T], width: u32, color: impl Fn(&T) -> [u8; 3]) -> Option<RgbImage> {
@@ -132,6 +143,7 @@ fn to_byte(value: f32) -> u8 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::output::is_anothers;
 
     #[test]
     fn a_picture_exposed_anew_is_as_if_it_had_been_made_so() {
@@ -173,5 +185,6 @@ mod tests {
         let picture = RgbImage::from_fn(5, 3, |x, y| Rgb([x as u8, y as u8, 7]));
         write_png(&picture, &path).unwrap();
         assert_eq!(image::open(&path).unwrap().into_rgb8(), picture);
+        assert!(!is_anothers(&path, MARK));
     }
 }

@@ -11,7 +11,7 @@ use std::path::Path;
 ///
 /// # Errors
 /// [`Error::Output`]; then nothing is left behind, and what was at `path` before is still there.
-pub(crate) fn write_whole<'a>(path: &Path, parts: impl IntoIterator<Item = &'a [u8]>) -> Result<()> {
+pub(super) fn write_whole<'a>(path: &Path, parts: impl IntoIterator<Item = &'a [u8]>) -> Result<()> {
     write_and_rename(path, parts).map_err(|error| explain(path, &error))
 }
 
@@ -25,6 +25,15 @@ pub fn write_alone(path: &Path, bytes: &[u8]) -> Result<()> {
     let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
     remove_leftovers(folder, &HashSet::from([name]))?;
     write_whole(path, [bytes])
+}
+
+/// True if `file` is anything but empty or a file that has our `mark` in it, whatever else that is.
+pub fn is_anothers(file: &Path, mark: &str) -> bool {
+    let Ok(found) = fs::metadata(file) else { return false };
+    // To open a pipe would wait for whoever writes to it.
+    let bytes = if found.is_file() { fs::read(file).ok() } else { None };
+    let has_mark = |bytes: &[u8]| bytes.windows(mark.len()).any(|part| part == mark.as_bytes());
+    bytes.is_none_or(|bytes| !bytes.is_empty() && !has_mark(&bytes))
 }
 
 fn write_and_rename<'a>(path: &Path, parts: impl IntoIterator<Item = &'a [u8]>) -> io::Result<()> {

@@ -155,6 +155,13 @@ fn differences_are_drawn_on_request() {
     assert_eq!(listing(&pictures), ["s.0000.png", "s.0001.png", "s.0002.png", "s.0003.png"]);
     let picture = image::open(pictures.join("s.0002.png")).unwrap().into_rgb8();
     assert_eq!(picture.dimensions(), (3 * 32 + 4 * 4, 18 + 2 * 4));
+    // Again, after one that was ended; but not over what somebody has painted.
+    let compare = || buzz(["compare", &paths[0], &paths[1], "--differences", &paths[2]]);
+    fs::write(pictures.join(".s.0001.png.x3Yz.tmp"), "half").unwrap();
+    compare().ok();
+    assert_eq!(listing(&pictures).len(), 4);
+    picture.save(pictures.join("s.0002.png")).unwrap();
+    compare().refused(4, &["s.0002.png", "another folder"]);
 }
 
 #[test]
