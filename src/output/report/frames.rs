@@ -27,7 +27,7 @@ pub struct Totals {
     pub rays: RayCounts,
     /// Wall seconds.
     pub seconds: TotalSeconds,
-    /// Reused samples that something hides from the eye; `None` without `--audit`.
+    /// Reused samples that something hides from the eye; `None` unless all inferred frames were made with `--audit`.
     pub hidden: Option<u64>,
     /// Most memory that any run held, bytes.
     pub peak_bytes: u64,
@@ -113,6 +113,9 @@ impl Totals {
                 *sum.hidden.get_or_insert(0) += hidden;
             }
         }
+        // The sum over some of them would be taken for that over all.
+        let is_audited = |f: &FrameRecord| f.kind == FrameKind::Traced || f.stats.hidden.is_some();
+        sum.hidden = sum.hidden.filter(|_| input.frames.iter().all(is_audited));
         let of_runs =
             |part: fn(&RunSeconds) -> f64| millionths(input.runs.iter().map(|r| part(&r.seconds)).sum());
         let StageSeconds { infer, trace, enhance, write } = rounded(sum.seconds);

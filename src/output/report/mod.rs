@@ -243,9 +243,11 @@ mod tests {
         FrameStats { pixels, subpixels, rays, seconds, hidden }
     }
 
+    fn record(number: i64, kind: FrameKind, stats: FrameStats) -> FrameRecord {
+        FrameRecord { id: number.into(), kind, stats, skipped: false }
+    }
+
     fn report() -> Report {
-        let record =
-            |number: i64, kind, stats| FrameRecord { id: number.into(), kind, stats, skipped: false };
         Report::new(ReportInput {
             input: "anim.gltf".into(),
             settings: Settings { quality: "half-pixel".into(), fps: [24_000, 1001], ..Settings::default() },
@@ -313,6 +315,22 @@ mod tests {
         assert_eq!(report.frames[1].seconds.infer, 0.123_457);
         assert_eq!(report.totals.seconds.wall, 0.0);
         assert_eq!((report.frames[0].from, report.frames[1].from), (None, Some(-1)));
+    }
+
+    #[test]
+    fn hidden_samples_are_summed_if_all_were_looked_for() {
+        let total = |hidden: [Option<u64>; 2]| {
+            let inferred = |i: usize| {
+                let stats = stats(PixelClass::Good, hidden[i]);
+                record(i as i64 + 1, FrameKind::Inferred { from: i as i64 }, stats)
+            };
+            let key = record(0, FrameKind::Traced, stats(PixelClass::Traced, None));
+            let frames = vec![key, inferred(0), inferred(1)];
+            Report::new(ReportInput { frames, ..ReportInput::default() }).totals.hidden
+        };
+        assert_eq!(total([Some(3), Some(4)]), Some(7));
+        assert_eq!(total([Some(3), None]), None);
+        assert_eq!(total([None, None]), None);
     }
 
     #[test]
