@@ -200,7 +200,7 @@ impl Report {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::frame::{FrameKind, FrameStats};
+    use crate::frame::{FrameId, FrameKind, FrameStats, StereoEye};
     use crate::output::{FrameRecord, KeyFrame, ReportInput};
 
     #[test]
@@ -231,6 +231,22 @@ mod tests {
         for tag in ["rect", "svg", "table", "details", "main", "dl", "ul", "script", "figure"] {
             assert_eq!(open(tag), closed(tag), "{tag}");
         }
+    }
+
+    #[test]
+    fn a_pair_is_one_frame_under_the_slider() {
+        let mut input = ReportInput::default();
+        input.settings.fps = [24, 1];
+        for number in 1..=2 {
+            for eye in [StereoEye::Left, StereoEye::Right] {
+                let id = FrameId { number, eye: Some(eye) };
+                let stats = FrameStats::default();
+                input.frames.push(FrameRecord { id, kind: FrameKind::Traced, stats, skipped: false });
+            }
+        }
+        let picture = |frame| Thumbnail { frame, beauty: String::new(), class: None, depth: None };
+        let page = Report::new(input).html(&[picture(1), picture(2)]);
+        assert!(page.contains("data-rate=\"24.000\"") && page.contains("Pictures of all 2 frames."));
     }
 
     #[test]

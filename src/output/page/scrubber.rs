@@ -1,6 +1,7 @@
 //! The pictures of a report, frame after frame under a slider.
 
 use super::escaped;
+use crate::frame::StereoEye;
 use crate::output::report::Report;
 use crate::output::thumbnails::{MOST_BYTES, MOST_FRAMES, SIDE, Thumbnail};
 use serde_json::json;
@@ -46,7 +47,7 @@ impl Report {
         let data = json!(data).to_string().replace('<', "\\u003c");
         let [numerator, denominator] = self.settings.fps;
         let rate = f64::from(numerator.max(1)) / f64::from(denominator.max(1));
-        let step = self.frames.len() as f64 / thumbnails.len() as f64;
+        let step = self.pictured_frames() as f64 / thumbnails.len() as f64;
         format!(
             "<h2>Frames</h2><p id=\"caption\" aria-live=\"polite\">{}</p><div class=\"pictures\">{figures}</div>\
              <div class=\"controls\"><label for=\"frame\">Frame</label>\
@@ -61,9 +62,14 @@ impl Report {
         )
     }
 
+    /// Frames of which there may be pictures: of a pair, the left eye's.
+    fn pictured_frames(&self) -> usize {
+        self.frames.iter().filter(|frame| frame.eye != Some(StereoEye::Right)).count()
+    }
+
     /// Of how many frames there are pictures, and why not of more.
     fn coverage(&self, pictures: usize) -> String {
-        let frames = self.frames.len();
+        let frames = self.pictured_frames();
         if pictures == frames {
             return format!("Pictures of all {frames} frames.");
         }
