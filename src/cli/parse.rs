@@ -23,8 +23,9 @@ pub fn is_frame_number(number: i64) -> bool {
 /// `1-100`, `1-100x2`, `1-7:2`, `1-10,20-30`, `7-7`, `7`, `-3--1`; `1-20&10-30` are the frames in both, of which there
 /// may be none.
 pub fn frames(text: &str) -> Result<BTreeSet<i64>> {
-    let lists = text.split('&').map(|list| frame_list(text, list)).collect::<Result<Vec<_>>>()?;
-    Ok(lists.into_iter().reduce(|a, b| &a & &b).unwrap_or_default())
+    let mut lists = text.split('&').map(|list| frame_list(text, list));
+    let first = lists.next().unwrap_or_else(|| Ok(BTreeSet::new()))?;
+    lists.try_fold(first, |both, list| Ok(&both & &list?))
 }
 
 fn frame_list(text: &str, list: &str) -> Result<BTreeSet<i64>> {
@@ -53,7 +54,7 @@ fn frame_list(text: &str, list: &str) -> Result<BTreeSet<i64>> {
             return Err(error());
         }
         let length = last - first;
-        if length / step >= MOST_FRAMES {
+        if found.len() as i64 + length / step >= MOST_FRAMES {
             return Err(usage("--frames", text, &format!("at most {MOST_FRAMES} frames")));
         }
         found.extend((0..=length / step).map(|i| first + i * step));
@@ -208,6 +209,8 @@ mod tests {
         assert_eq!(list("1-4&3-9"), [3, 4]);
         assert_eq!(list("1-20x2&1,4-7&-9-6"), [1, 5]);
         assert_eq!(list("1-4&5-9"), [0; 0]);
+        assert_eq!(frames("0-499999,500000-999999&0-999999").unwrap().len(), 1_000_000);
+        assert!(frames("0-499999,500000-1000000").unwrap_err().to_string().contains("at most"));
         for bad in ["1-4&", "&1", "", "a", "5-1", "1-5x0", "1--", "1-99999999999", "--", "1-5x"] {
             assert!(frames(bad).is_err(), "{bad}");
         }
