@@ -115,11 +115,12 @@ pub fn run(args: ConvertArgs) -> Result<ExitCode> {
     }
     let count = to_render.iter().flat_map(|&f| pictures_of(f, &job.settings)).count();
     let work = Work { frames: count, on_the_way: plan.on_the_way(&to_render) };
-    let progress = Progress::new(args.output.progress, work, interrupt);
     let mut thumbnails = Thumbnails::of(&frames, timing.pixel_aspect);
-    for record in skipped.iter().filter(|r| r.id.eye != Some(StereoEye::Right)) {
-        thumbnails.read(record.id.number, &sink.folder().file_of(record.id));
-    }
+    let pictured = skipped.iter().filter(|r| r.id.eye != Some(StereoEye::Right));
+    let files: Vec<_> = pictured.map(|r| (r.id.number, sink.folder().file_of(r.id))).collect();
+    thumbnails.read(&files, || interrupt.stop_requested())?;
+    // Its clock tells how long frames take: it begins with them.
+    let progress = Progress::new(args.output.progress, work, interrupt);
     let mut recorder = Recorder { progress, records: skipped, on_the_way: 0.0 };
     let Job { scene, accel, settings, .. } = &mut job;
     let mut shown = WithThumbnails { sink: &mut sink, thumbnails: &mut thumbnails };

@@ -3,17 +3,17 @@
 //! They are taken as frames pass to the sink ([`WithThumbnails`]), and read from their files for frames that were there
 //! already. Their number, their size and what they take in a page are bounded, however long the sequence is.
 
-use crate::Result;
 use crate::frame::{Frame, FrameId, StageSeconds, StereoEye};
 use crate::measure::{Exposure, Percentile, picture, read_frame};
 use crate::sequence::FrameSink;
+use crate::{Error, Result};
 use base64::Engine;
 use image::codecs::jpeg::JpegEncoder;
 use image::codecs::webp::WebPEncoder;
 use image::{ExtendedColorType, ImageEncoder, ImageFormat, RgbImage};
 use rayon::prelude::*;
 use std::collections::{BTreeMap, BTreeSet};
-use std::path::Path;
+use std::path::PathBuf;
 
 /// Frames of which there are pictures at most.
 pub const MOST_FRAMES: usize = 200;
@@ -68,13 +68,23 @@ impl Thumbnails {
         Self { chosen, small: BTreeMap::new(), percentile: Percentile::default(), pixel_aspect }
     }
 
-    /// Takes a frame's pictures from its file; a file that cannot be read leaves it without.
-    pub fn read(&mut self, number: i64, file: &Path) {
-        if self.chosen.contains(&number)
-            && let Ok(frame) = read_frame(file)
-        {
-            self.add(number, frame.width, &frame.color, &frame.depth, &frame.class);
-        }
+    /// Takes frames' pictures from their files; a file that cannot be read leaves its frame without.
+    ///
+    /// # Errors
+    /// [`Error::Interrupted`] as soon as `stop` names a signal.
+    pub fn read(&mut self, files: &[(i64, PathBuf)], stop: impl Fn() -> Option<i32> + Sync) -> Result<()> {
+        let chosen = files.par_iter().filter(|(number, _)| self.chosen.contains(number));
+        let read = |(number, file): &(i64, PathBuf)| {
+            if let Some(signal) = stop() {
+                return Err(Error::Interrupted { signal });
+            }
+            let Ok(frame) = read_frame(file) else { return Ok(None) };
+            let small = self.small(frame.width, &frame.color, &frame.depth, &frame.class);
+            Ok(small.map(|small| (*number, small)))
+        };
+        let read: Vec<_> = chosen.map(read).collect::<Result<_>>()?;
+        read.into_iter().flatten().for_each(|(number, small)| self.keep(number, small));
+        Ok(())
     }
 
     fn exposure(&self) -> Exposure {
@@ -82,23 +92,41 @@ impl Thumbnails {
     }
 
     fn add(&mut self, number: i64, width: usize, color: &[[f32; 4]], depth: &[f32], class: &[u8]) {
-        if !self.chosen.contains(&number) || width == 0 || color.is_empty() {
-            return;
+        if self.chosen.contains(&number)
+            && let Some(small) = self.small(width, color, depth, class)
+        {
+            self.keep(number, small);
+        }
+    }
+
+    fn keep(&mut self, number: i64, (small, percentile): (Small, Percentile)) {
+        self.percentile.merge(&percentile);
+        self.small.insert(number, small);
+    }
+
+    /// A frame made small, and how bright it is.
+    fn small(
+        &self,
+        width: usize,
+        color: &[[f32; 4]],
+        depth: &[f32],
+        class: &[u8],
+    ) -> Option<(Small, Percentile)> {
+        if width == 0 || color.is_empty() {
+            return None;
         }
         let grid = Grid::new(width, color.len() / width, self.pixel_aspect);
         let (columns, color) = (grid.columns as u32, grid.means(color));
         let mut percentile = Percentile::default();
         percentile.add(&color);
-        self.percentile.merge(&percentile);
         let exposure = Exposure::from_p99(percentile.get(0.99));
-        let Some(beauty) = picture::beauty(&color, columns, exposure).and_then(|p| jpeg(&p, KEPT)) else {
-            return;
-        };
+        let beauty = picture::beauty(&color, columns, exposure).and_then(|p| jpeg(&p, KEPT))?;
         let (depth, class) = (grid.centers(depth), grid.centers(class));
         let depth = picture::depth(&depth, columns).filter(|_| !depth.is_empty());
         let class = picture::classes(&class, columns).filter(|_| !class.is_empty());
         let depth = depth.and_then(|p| jpeg(&p, SHOWN));
-        self.small.insert(number, Small { beauty, exposure, depth, class: class.and_then(|p| webp(&p)) });
+        let class = class.and_then(|p| webp(&p));
+        Some((Small { beauty, exposure, depth, class }, percentile))
     }
 
     /// The beauty of every frame, or of at most so many that are spread evenly, under one exposure.
@@ -288,6 +316,20 @@ mod tests {
             let [found, ..] = thumbnails.beauties(2)[&frame].get_pixel(32, 32).0;
             assert!((f32::from(found) - shown).abs() <= 2.0, "{found} for {shown}");
         }
+    }
+
+    #[test]
+    fn files_are_read_until_there_is_a_signal() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.exr");
+        exr::prelude::write_rgb_file(&path, 4, 2, |_, _| (0.2, 0.3, 0.5)).unwrap();
+        let files: Vec<_> = (0..4).map(|frame| (frame, path.clone())).collect();
+        let mut thumbnails = Thumbnails::of(&(0..3).collect(), 1.0);
+        let stopped = thumbnails.read(&files, || Some(15));
+        assert!(matches!(stopped, Err(Error::Interrupted { signal: 15 })));
+        assert!(thumbnails.encoded().is_empty());
+        thumbnails.read(&files, || None).unwrap();
+        assert_eq!(thumbnails.encoded().iter().map(|t| t.frame).collect::<Vec<_>>(), [0, 1, 2]);
     }
 
     #[test]
