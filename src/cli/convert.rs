@@ -2,7 +2,8 @@
 
 use super::args::{CompressionArg, ConvertArgs};
 use super::existing::{
-    existing, place_of, prepare_report, refuse_inputs, refuse_report_of_another, remove_report, report_files,
+    existing, place_of, prepare_report, refuse_inputs, refuse_report_of_another, remove_stale_reports,
+    report_files,
 };
 use super::interrupt::Interrupt;
 use super::job::{Job, stem, warn_of_ignored};
@@ -109,9 +110,12 @@ pub fn run(args: ConvertArgs) -> Result<ExitCode> {
         quality: job.settings.quality.name().into(),
         settings_hash: hash.clone(),
     };
+    let is_there = |&&frame: &&i64| pictures_of(frame, &job.settings).any(|id| folder.file_of(id).exists());
+    let replaced: BTreeSet<i64> = to_render.iter().filter(is_there).copied().collect();
     let mut sink = ExrSink::new(folder, options)?;
-    if args.output.overwrite && !to_render.is_empty() {
-        remove_report(&report_path)?;
+    if !to_render.is_empty() {
+        let whole = out_dir.join("report.json");
+        remove_stale_reports(&report_path, &whole, input, &hash, &replaced, &args)?;
     }
     let count = to_render.iter().flat_map(|&f| pictures_of(f, &job.settings)).count();
     let work = Work { frames: count, on_the_way: plan.on_the_way(&to_render) };

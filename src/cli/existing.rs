@@ -23,11 +23,14 @@ pub fn existing(
     args: &ConvertArgs,
     interrupt: &Interrupt,
 ) -> Result<Vec<FrameRecord>> {
+    let pictures = || frames.iter().flat_map(|&number| pictures_of(number, settings));
+    if let Some(path) = pictures().map(|id| folder.file_of(id)).find(|path| path.is_dir()) {
+        return Err(Error::output(path, "is a folder, where a frame is to be; move it away").into());
+    }
     if args.output.overwrite {
         return Ok(Vec::new());
     }
     if !args.output.skip_existing {
-        let pictures = || frames.iter().flat_map(|&number| pictures_of(number, settings));
         if let Some(path) = pictures().map(|id| folder.file_of(id)).find(|path| path.exists()) {
             let message = "is there already; give --skip-existing to keep finished frames, or --overwrite to replace them";
             return Err(Error::output(path, message).into());
@@ -153,8 +156,7 @@ pub fn refuse_report_of_another(path: &Path, input: &Path) -> Result<()> {
         }
     }
     let Some(report) = Report::read(path) else { return Ok(()) };
-    // In a report names are text.
-    if Path::new(&report.input).file_name() == Path::new(&*input.to_string_lossy()).file_name() {
+    if is_of(&report, input) {
         return Ok(());
     }
     let message = format!(
@@ -164,8 +166,38 @@ pub fn refuse_report_of_another(path: &Path, input: &Path) -> Result<()> {
     Err(Error::output(path, message).into())
 }
 
-/// Removes the report of frames that are about to be replaced: of an interrupted run it would say what is not so.
-pub fn remove_report(path: &Path) -> Result<()> {
+/// True if the report is of a file of this name. In a report names are text.
+fn is_of(report: &Report, input: &Path) -> bool {
+    Path::new(&report.input).file_name() == Path::new(&*input.to_string_lossy()).file_name()
+}
+
+/// Removes reports of frames that are about to be replaced: after an interruption they would say what is not so. That is the
+/// run's own at `path`, unless it is of these settings and frames are kept; and that of the whole range beside the frames, if it
+/// is of `input`, of other settings, and of one of the `replaced` frames.
+pub fn remove_stale_reports(
+    path: &Path,
+    whole: &Path,
+    input: &Path,
+    hash: &SettingsHash,
+    replaced: &BTreeSet<i64>,
+    args: &ConvertArgs,
+) -> Result<()> {
+    let is_other = |report: &Report| report.settings_hash != *hash;
+    if args.output.overwrite || Report::read(path).is_some_and(|report| is_other(&report)) {
+        remove_report(path)?;
+    }
+    let is_stale = |report: Report| {
+        is_other(&report)
+            && is_of(&report, input)
+            && report.frames.iter().any(|frame| replaced.contains(&frame.frame))
+    };
+    if Report::read(whole).is_some_and(is_stale) {
+        remove_report(whole)?;
+    }
+    Ok(())
+}
+
+fn remove_report(path: &Path) -> Result<()> {
     for file in [path.to_path_buf(), path.with_extension("html")] {
         match std::fs::remove_file(&file) {
             Err(e) if e.kind() != std::io::ErrorKind::NotFound => {

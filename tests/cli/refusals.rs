@@ -131,7 +131,10 @@ fn output_that_cannot_be_written_is_refused_with_4() {
     assert!(!out.exists(), "it was found out before the rendering: {:?}", listing(&out));
     // The folder in the way of a frame is named, too.
     fs::create_dir_all(out.join("s.0001.exr/x")).unwrap();
-    run(&scene, &out, "-r 8x8 --overwrite --progress none").refused(4, &["s.0001.exr"]);
+    for options in ["--overwrite", "--skip-existing", ""] {
+        run(&scene, &out, &format!("-r 8x8 {options}")).refused(4, &["s.0001.exr", "folder"]);
+    }
+    assert_eq!(listing(&out), ["s.0001.exr"], "it was found out before the rendering");
 }
 
 #[test]

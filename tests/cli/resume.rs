@@ -125,6 +125,29 @@ fn a_report_goes_with_the_frames_that_it_is_of() {
     assert!(!out.join("report.html").exists() || json(&out.join("report.json"))["settings"]["width"] == 1280);
 }
 
+#[test]
+fn a_report_goes_when_a_part_of_its_frames_is_replaced() {
+    let (_folder, scene, out) = rendered();
+    let is_there = || [out.join("report.json").exists(), out.join("report.html").exists()];
+    // The same pixels, no pixels of its own, and other files leave it as true as it was.
+    for options in ["-f 1 --overwrite", "-f 9 --bounces 0", "-f 1 --name o.#.exr --bounces 0"] {
+        again(&scene, &out, options).ok();
+        assert_eq!(is_there(), [true; 2], "{options}");
+    }
+    for options in ["--skip-existing", "--overwrite"] {
+        again(&scene, &out, &format!("-f 1 --bounces 0 {options}")).ok();
+        assert_eq!(is_there(), [false; 2], "{options}");
+        again(&scene, &out, "--skip-existing").ok();
+        assert_eq!(is_there(), [true; 2]);
+    }
+    // A resumed run of other settings that is ended leaves none of before.
+    let run = crate::rig::Running::start(&scene, &out, "-r 1280x720 -q full --skip-existing --progress none");
+    crate::rig::wait_for("the old report to go", || !out.join("report.json").exists());
+    run.signal("-TERM");
+    run.end();
+    assert!(!out.join("report.html").exists() || json(&out.join("report.json"))["settings"]["width"] == 1280);
+}
+
 #[cfg(target_os = "linux")]
 #[test]
 fn a_name_that_is_no_text_is_known_again() {
