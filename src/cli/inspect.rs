@@ -1,11 +1,14 @@
 //! `buzz-convert inspect`: what the scene holds, what it requires, what will be ignored.
 
 use super::args::{Format, InspectArgs};
+use super::job;
 use super::memory::held_per_pixel;
-use super::{job, say};
+use super::say::{self, escaped};
 use anyhow::Result;
 use buzz::infer::BuzzBuffer;
-use buzz::scene::{Interpolation, Light, LightKind, Outline, Projection, Requirements, Scene, Target};
+use buzz::scene::{
+    Ignored, Interpolation, Light, LightKind, Outline, Projection, Requirements, Scene, Target,
+};
 use buzz::sequence::Settings;
 use buzz::trace::{TraceOptions, lit_words};
 use serde_json::{Value, json};
@@ -71,12 +74,12 @@ fn as_text(scene: &Scene) -> String {
     );
     text += &format!("frames {}-{} at {:.3} a second\n", timing.first, timing.last, timing.fps.value());
     for (i, camera) in scene.cameras.iter().enumerate() {
-        text += &format!("camera {i}: {}\n", camera.name);
+        text += &format!("camera {i}: {}\n", escaped(&camera.name));
     }
     for light in &scene.lights {
         let size: Vec<String> = light_size(light).iter().map(f32::to_string).collect();
         let size = if size.is_empty() { String::new() } else { format!(" {}", size.join(" x ")) };
-        text += &format!("light: {} ({}{size})\n", light.name, light_kind(light));
+        text += &format!("light: {} ({}{size})\n", escaped(&light.name), light_kind(light));
     }
     if scene.is_dark() {
         text += "nothing in it shines: all is black\n";
@@ -90,7 +93,8 @@ fn as_text(scene: &Scene) -> String {
         held_bytes_per_pixel(scene)
     );
     for ignored in &scene.ignored {
-        text += &format!("ignored: {} at {}: {}\n", ignored.feature, ignored.place, ignored.effect);
+        let Ignored { feature, place, effect } = ignored;
+        text += &format!("ignored: {}\n", escaped(format_args!("{feature} at {place}: {effect}")));
     }
     text
 }

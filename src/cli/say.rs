@@ -20,11 +20,16 @@ pub fn result(text: &str) -> Result<()> {
 
 /// A line on standard error; if it cannot be written, there is nobody to tell. Names in it may hold anything; it stays one line.
 pub fn line(text: impl Display) {
+    let _ = writeln!(stderr(), "{}", escaped(text));
+}
+
+/// The text with its control characters spelled out, which could end the line or change the terminal.
+pub fn escaped(text: impl Display) -> String {
     let mut line = String::new();
     for c in text.to_string().chars() {
         if c.is_control() { line.extend(c.escape_default()) } else { line.push(c) }
     }
-    let _ = writeln!(stderr(), "{line}");
+    line
 }
 
 /// An error or a warning.

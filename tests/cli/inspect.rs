@@ -1,7 +1,7 @@
 //! What `inspect` says that a scene requires, and that what it does not require is neither run nor stored.
 
 use crate::rig::{buzz, fresh};
-use crate::stage::{CARD, LAMP, Stage};
+use crate::stage::{CAMERA, CARD, LAMP, Stage};
 use serde_json::Value;
 
 fn inspect(stage: &Stage) -> Value {
@@ -34,6 +34,23 @@ fn a_light_asks_for_shadow_bits() {
     assert_eq!(added(&lit, &dark, "requires"), ["lights"]);
     assert_eq!(added(&lit, &dark, "stages"), ["shadow", "shadow-edges", "diffuse", "highlights"]);
     assert_eq!(bytes(&lit, "bytes_per_pixel"), bytes(&dark, "bytes_per_pixel") + 4);
+}
+
+#[test]
+fn names_do_nothing_to_the_terminal() {
+    let (folder, _) = fresh();
+    let mut stage = Stage::new();
+    let name = "L\u{1b}[2J\nlight: none";
+    for node in [CAMERA, LAMP] {
+        stage.json["nodes"][node]["name"] = name.into();
+    }
+    stage.json["extensions"]["KHR_lights_punctual"]["lights"][0]["name"] = name.into();
+    stage.json["cameras"][0]["name"] = name.into();
+    stage.json["materials"][0]["extensions"] = serde_json::json!({"X\u{1b}[31m": {}});
+    let path = stage.write(&folder.path().join("s.gltf"));
+    let said = buzz(["inspect", path.to_str().unwrap()]).ok().out;
+    assert!(!said.chars().any(|c| c.is_control() && c != '\n'), "{said}");
+    assert_eq!(said.matches("L\\u{1b}[2J\\nlight: none").count(), 2, "{said}");
 }
 
 #[test]
