@@ -15,15 +15,15 @@ use serde_json::{Value, json};
 use std::process::ExitCode;
 
 pub fn run(args: InspectArgs) -> Result<ExitCode> {
-    let scene = job::read(&args.input, &args.scene, None)?;
+    let (scene, camera) = job::read(&args.input, &args.scene, None)?;
     say::result(&match args.format {
-        Format::Json => serde_json::to_string_pretty(&as_json(&scene))? + "\n",
-        Format::Text => as_text(&scene),
+        Format::Json => serde_json::to_string_pretty(&as_json(&scene, camera))? + "\n",
+        Format::Text => as_text(&scene, camera),
     })?;
     Ok(ExitCode::SUCCESS)
 }
 
-fn as_json(scene: &Scene) -> Value {
+fn as_json(scene: &Scene, camera: Option<usize>) -> Value {
     let needs = Requirements::of(scene);
     let cameras = scene.cameras.iter().map(|c| match c.lens.projection {
         Projection::Perspective { yfov } => json!({"name": c.name, "type": "perspective", "yfov": yfov}),
@@ -56,10 +56,11 @@ fn as_json(scene: &Scene) -> Value {
         "fps": [timing.fps.numerator, timing.fps.denominator],
         "frames": [timing.first, timing.last],
         "resolution": timing.resolution,
+        "camera": camera,
     })
 }
 
-fn as_text(scene: &Scene) -> String {
+fn as_text(scene: &Scene, chosen: Option<usize>) -> String {
     let needs = Requirements::of(scene);
     let timing = &scene.timing;
     let mut text = format!(
@@ -74,7 +75,8 @@ fn as_text(scene: &Scene) -> String {
     );
     text += &format!("frames {}-{} at {:.3} a second\n", timing.first, timing.last, timing.fps.value());
     for (i, camera) in scene.cameras.iter().enumerate() {
-        text += &format!("camera {i}: {}\n", escaped(&camera.name));
+        let mark = if chosen == Some(i) { " (chosen)" } else { "" };
+        text += &format!("camera {i}: {}{mark}\n", escaped(&camera.name));
     }
     for light in &scene.lights {
         let size: Vec<String> = light_size(light).iter().map(f32::to_string).collect();

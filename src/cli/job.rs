@@ -39,18 +39,15 @@ impl Job {
         let threads = use_threads(render.threads)?;
         let longest_segment = parse::segment(&render.segment)?;
         let start = Instant::now();
-        let mut scene = read(input, scene_args, memory)?;
+        let (scene, camera) = read(input, scene_args, memory)?;
         let import_seconds = start.elapsed().as_secs_f64();
         require_camera(&scene, input)?;
-        if let Some(first) = scene_args.start_frame {
-            renumber(&mut scene, first)?;
-        }
         refuse_endless(&scene, input)?;
         let own = scene.timing.resolution.unwrap_or((1280, 720));
         let (width, height) =
             render.resolution.as_deref().map_or(Ok(own), |text| parse::resolution(text, own))?;
         let mut settings = Settings::new(width, height);
-        settings.camera = scene_args.camera.as_deref().map(|name| find_camera(&scene, name)).transpose()?;
+        settings.camera = camera;
         let start = Instant::now();
         let accel = Accel::new(&scene);
         let accel_seconds = start.elapsed().as_secs_f64();
@@ -104,8 +101,9 @@ impl Job {
     }
 }
 
-/// Reads the scene. Refuses pictures that take more than so many bytes of memory, or than the machine has.
-pub fn read(input: &Path, args: &SceneArgs, memory: Option<u64>) -> Result<Scene> {
+/// Reads the scene, and finds the camera in it that is asked for. Refuses pictures that take more than so many bytes of memory, or
+/// than the machine has.
+pub fn read(input: &Path, args: &SceneArgs, memory: Option<u64>) -> Result<(Scene, Option<usize>)> {
     let options = ImportOptions {
         fps: args.fps.as_deref().map(parse::fps).transpose()?,
         geometry: args.geometry.clone(),
@@ -114,7 +112,12 @@ pub fn read(input: &Path, args: &SceneArgs, memory: Option<u64>) -> Result<Scene
         picture_bytes: memory.or_else(most_bytes),
         strict: args.strict,
     };
-    Ok(import(input, &options)?)
+    let mut scene = import(input, &options)?;
+    if let Some(first) = args.start_frame {
+        renumber(&mut scene, first)?;
+    }
+    let camera = args.camera.as_deref().map(|name| find_camera(&scene, name)).transpose()?;
+    Ok((scene, camera))
 }
 
 /// Says once what of the scene is not rendered, and if nothing in it shines.

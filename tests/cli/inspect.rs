@@ -37,6 +37,21 @@ fn a_light_asks_for_shadow_bits() {
 }
 
 #[test]
+fn frames_and_cameras_are_those_that_are_asked_for() {
+    let (folder, _) = fresh();
+    let path = Stage::drifting(4).write(&folder.path().join("s.gltf"));
+    let inspect = |options: &str| {
+        buzz(["inspect", path.to_str().unwrap()].into_iter().chain(options.split_whitespace()))
+    };
+    let said = inspect("--start-frame 1001 --camera Cam").ok().out;
+    assert!(said.contains("frames 1001-1004 ") && said.contains("camera 0: Cam (chosen)\n"), "{said}");
+    let said: Value = serde_json::from_str(&inspect("--camera 0 --format json").ok().out).unwrap();
+    assert_eq!((&said["frames"], &said["camera"]), (&serde_json::json!([0, 3]), &0.into()));
+    inspect("--camera Nobody").refused(2, &["--camera Nobody", "0 Cam"]);
+    inspect("--start-frame 9999999999").refused(2, &["--start-frame"]);
+}
+
+#[test]
 fn names_do_nothing_to_the_terminal() {
     let (folder, _) = fresh();
     let mut stage = Stage::new();
