@@ -34,9 +34,11 @@ pub struct ReadFrame {
 pub fn read_frame(path: &Path) -> Result<ReadFrame> {
     let fail = |message: String| Error::input(path, "file", message);
     let meta = MetaData::read_from_file(path, false).map_err(|e| fail(e.to_string()))?;
-    let header = meta.headers.first().ok_or_else(|| fail("it has no image".into()))?;
-    let names: Vec<String> = header.channels.list.iter().map(|c| c.name.to_string()).collect();
-    let prefix = color_prefix(&names).ok_or_else(|| fail("it has no channels R, G and B".into()))?;
+    let colored = meta.headers.iter().find_map(|header| {
+        let names: Vec<String> = header.channels.list.iter().map(|c| c.name.to_string()).collect();
+        Some((header, color_prefix(&names)?.to_owned(), names))
+    });
+    let (header, prefix, names) = colored.ok_or_else(|| fail("it has no channels R, G and B".into()))?;
     let has = |name: &str| names.iter().any(|n| n == name);
 
     let channel = |name: &str| Text::from(format!("{prefix}{name}").as_str());

@@ -163,6 +163,30 @@ fn what_cannot_be_compared_is_an_error_that_names_it() {
 }
 
 #[test]
+fn colours_are_read_from_whichever_part_has_them() {
+    use exr::prelude::{
+        AnyChannel, AnyChannels, Encoding, FlatSamples, Image, ImageAttributes, IntegerBounds, Layer,
+        LayerAttributes, WritableImage,
+    };
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.1.exr");
+    let part = |name: &str, channels: &[(&str, f32)]| {
+        let channel = |&(name, value): &(&str, f32)| AnyChannel::new(name, FlatSamples::F32(vec![value; 6]));
+        let channels = AnyChannels::sort(channels.iter().map(channel).collect());
+        Layer::new((3, 2), LayerAttributes::named(name), Encoding::UNCOMPRESSED, channels)
+    };
+    let parts = [
+        part("depth", &[("Z", 7.0)]),
+        part("beauty", &[("R", 0.1), ("G", 0.2), ("B", 0.3), ("depth.Z", 4.0)]),
+        part("other", &[("R", 0.5), ("G", 0.5), ("B", 0.5)]),
+    ];
+    let attributes = ImageAttributes::new(IntegerBounds::from_dimensions((3, 2)));
+    Image::from_layers(attributes, parts.to_vec()).write().to_file(&path).unwrap();
+    let read = read_frame(&path).unwrap();
+    assert_eq!((read.color, read.depth), (vec![[0.1, 0.2, 0.3, 1.0]; 6], vec![4.0; 6]));
+}
+
+#[test]
 fn other_layers_come_back_too() {
     let folder = tempfile::tempdir().unwrap();
     let frame = plain(3, FrameKind::Inferred { from: 2 });
