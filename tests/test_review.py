@@ -8,6 +8,7 @@ import shutil
 import subprocess
 import sys
 from pathlib import Path
+from urllib.parse import unquote
 
 import numpy as np
 import opentimelineio as otio
@@ -41,7 +42,7 @@ def test_the_timeline_lists_all_frames(sequence: Path) -> None:
     files = []
     for clip in clips:
         reference = clip.media_reference
-        files += [path.parent / reference.target_url_for_image_number(i) for i in range(reference.number_of_images_in_sequence())]
+        files += [path.parent / unquote(reference.target_url_for_image_number(i)) for i in range(reference.number_of_images_in_sequence())]
         assert clip.source_range == reference.available_range
     assert [f.name for f in files] == [f"yard one.{n:04}.exr" for n in FRAMES]
     assert all(f.exists() for f in files)
@@ -74,7 +75,7 @@ def test_the_timeline_finds_frames_below_0(across_zero: Path) -> None:
     clips = list(timeline.find_clips())
     assert [clip.name for clip in clips] == ["neg -4--1", "neg 0-5"]
     references = [clip.media_reference for clip in clips]
-    files = [path.parent / r.target_url_for_image_number(i) for r in references for i in range(r.number_of_images_in_sequence())]
+    files = [path.parent / unquote(r.target_url_for_image_number(i)) for r in references for i in range(r.number_of_images_in_sequence())]
     assert [f.name for f in files] == ["neg.-004.exr", "neg.-003.exr", "neg.-002.exr", "neg.-001.exr", *(f"neg.{n:04}.exr" for n in range(6))]
     assert all(f.exists() for f in files)
     assert (timeline.duration().to_frames(), timeline.global_start_time.to_frames()) == (10, -4)

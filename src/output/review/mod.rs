@@ -136,6 +136,20 @@ mod tests {
     }
 
     #[test]
+    fn names_are_encoded_where_urls_are_asked_for() {
+        let frames: BTreeSet<i64> = (1..=3).collect();
+        let names = NamePattern::parse("<stem>.####_%%.exr", "sh#1 50%41é").unwrap();
+        let text = of(Path::new(""), &names, &frames).timeline("/a b/c?/");
+        let timeline: serde_json::Value = serde_json::from_str(&text).unwrap();
+        let clip = &timeline["tracks"]["children"][0]["children"][0];
+        let reference = &clip["media_references"]["DEFAULT_MEDIA"];
+        assert_eq!(reference["target_url_base"], "/a%20b/c%3F/");
+        assert_eq!(reference["name_prefix"], "sh%231%2050%2541%C3%A9.");
+        assert_eq!(reference["name_suffix"], "_%25.exr");
+        assert_eq!(timeline["name"], "sh#1 50%41é");
+    }
+
+    #[test]
     fn everything_is_written_beside_the_report_and_refers_to_the_frames() {
         let folder = tempfile::tempdir().unwrap();
         let frames: BTreeSet<i64> = (1..=3).collect();

@@ -1,7 +1,12 @@
 //! An OpenTimelineIO file: one track, a clip for each shot, a marker at each key frame.
 
 use super::Review;
+use percent_encoding::{AsciiSet, NON_ALPHANUMERIC, utf8_percent_encode};
 use serde_json::{Value, json};
+
+/// All but letters, digits, what needs no encoding anywhere, and what divides a path.
+const NOT_IN_URLS: AsciiSet =
+    NON_ALPHANUMERIC.remove(b'-').remove(b'.').remove(b'_').remove(b'~').remove(b'/');
 
 impl Review<'_> {
     /// The timeline, with the frames in folder `base`.
@@ -63,6 +68,9 @@ impl Review<'_> {
             })
             .collect();
         let shown = range(first, last - first + 1, rate);
+        // Joined, the three are a URL.
+        let [base, prefix, suffix] =
+            [base, prefix, suffix].map(|part| utf8_percent_encode(part, &NOT_IN_URLS).to_string());
         json!({
             "OTIO_SCHEMA": "Clip.2", "name": format!("{} {first}-{last}", self.title()), "metadata": {}, "enabled": true,
             "effects": [], "markers": markers, "source_range": shown, "active_media_reference_key": "DEFAULT_MEDIA",
