@@ -82,10 +82,10 @@ impl Job {
             let message = "--plan: its frames are inferred from others, but --quality full traces every frame; leave one of them out";
             return Err(Error::Usage(message.into()).into());
         }
-        let segments = file.segments(self.scene.timing.fps)?;
+        let (segments, cuts) = (file.segments(self.scene.timing.fps)?, file.cuts()?);
         let path = self.path(observer)?;
         let unfit = |what| file.unfit("/segments", format!("{what}; make a new plan of this scene"));
-        Ok(replay(&path, &self.cuts(), quality, &segments, file.cuts()).map_err(unfit)?)
+        Ok(replay(&path, &self.cuts(), quality, &segments, cuts).map_err(unfit)?)
     }
 
     fn path(&mut self, observer: &dyn Observer) -> Result<Vec<PathFrame>> {

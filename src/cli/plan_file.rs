@@ -6,6 +6,7 @@ use buzz::output::{self, KeyFrame, SegmentRange};
 use buzz::plan::{Plan, Reason, Segment};
 use buzz::scene::Rational;
 use serde::{Deserialize, Serialize};
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
 /// The part of a printed plan that decides the frames; the rest of it tells why, and is not read.
@@ -56,9 +57,17 @@ impl PlanFile {
         self.segments.iter().any(|s| s.first != s.last)
     }
 
-    /// First frames after a cut.
-    pub fn cuts(&self) -> &[i64] {
-        &self.cuts
+    /// First frames after a cut, in order: each is that of a segment.
+    pub fn cuts(&self) -> Result<&[i64]> {
+        let firsts: BTreeSet<i64> = self.segments.iter().map(|s| s.first).collect();
+        for (i, &cut) in self.cuts.iter().enumerate() {
+            let follows = i == 0 || self.cuts[i - 1] < cut;
+            if !follows || !firsts.contains(&cut) {
+                let message = format!("{cut} must be the first frame of a segment, after the cut before it");
+                return Err(self.unfit(&format!("/cuts/{i}"), message).into());
+            }
+        }
+        Ok(&self.cuts)
     }
 
     /// Its segments and the reasons for their key frames, if they are at `fps` frames a second.

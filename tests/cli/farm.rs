@@ -292,8 +292,16 @@ fn a_plan_that_does_not_fit_is_refused() {
     refused(&keyless, "", 3, &["/keyframes/0"]);
     let unknown = attempt("reason.json", &|p| p["keyframes"][1]["reason"] = "whim".into());
     refused(&unknown, "", 3, &["/keyframes/1", "reasons"]);
-    let cut = attempt("cut.json", &|p| p["cuts"] = serde_json::json!([2]));
-    refused(&cut, "", 3, &["/segments", "frame 2", "cut"]);
+    let second = good["segments"][1]["first"].as_i64().unwrap();
+    for (name, cuts, place) in [
+        ("within", vec![2], "/cuts/0"),
+        ("outside", vec![second, 900], "/cuts/1"),
+        ("twice", vec![second, second], "/cuts/1"),
+        ("turned", vec![second, 0], "/cuts/1"),
+    ] {
+        let file = attempt(&format!("{name}.json"), &|p| p["cuts"] = serde_json::json!(cuts));
+        refused(&file, "", 3, &[place, &cuts[cuts.len() - 1].to_string(), "segment"]);
+    }
     let rate = attempt("rate.json", &|p| p["fps"] = serde_json::json!([25, 1]));
     refused(&rate, "", 3, &["/fps", "25/1", "24/1"]);
     let as_made = attempt("good.json", &|_| ());
