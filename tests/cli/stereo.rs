@@ -62,6 +62,16 @@ fn each_eye_has_its_files_and_the_right_one_costs_little() {
 }
 
 #[test]
+fn a_right_eyes_header_says_what_it_was_made_from() {
+    let (_folder, out) = stereo("-r 16x9");
+    let says = |name: &str, text: &str| {
+        fs::read(out.join(name)).unwrap().windows(text.len()).any(|part| part == text.as_bytes())
+    };
+    assert!(says("courtyard.right.0003.exr", "inferred from the left eye"));
+    assert!(says("courtyard.left.0003.exr", "inferred from frame "));
+}
+
+#[test]
 fn what_stands_at_the_convergence_is_at_one_place() {
     let (folder, out) = fresh();
     // The card is six metres away.

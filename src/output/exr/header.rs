@@ -6,7 +6,7 @@
 use super::channels::Channel;
 use super::cryptomatte::MatteLayer;
 use super::{FileOptions, counts};
-use crate::frame::{Frame, FrameKind, PixelClass};
+use crate::frame::{Frame, FrameKind, PixelClass, StereoEye};
 use crate::scene::{Projection, Rational, View};
 use exr::math::Vec2;
 use exr::meta::attribute::{
@@ -145,6 +145,9 @@ fn clamp_i32(value: i64) -> i32 {
 fn comments(frame: &Frame, options: &FileOptions) -> String {
     let made = match frame.kind {
         FrameKind::Traced => "key frame, traced".to_string(),
+        FrameKind::Inferred { .. } if frame.eye == Some(StereoEye::Right) => {
+            "inferred from the left eye".into()
+        }
         FrameKind::Inferred { from } => format!("inferred from frame {from}"),
     };
     format!("{made}, quality {}", options.quality)
