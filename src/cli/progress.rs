@@ -109,7 +109,8 @@ impl Progress {
             }
             Style::Openjd => {
                 // A reader that cannot be reached is no error of the frame's.
-                let _ = say::result(&format!("openjd_status: {what}: frame {frame}\n"));
+                let left = HumanDuration(self.left());
+                let _ = say::result(&format!("openjd_status: {what}: frame {frame}, {left} left\n"));
             }
             Style::None => {}
         }
@@ -138,8 +139,10 @@ impl Progress {
             )),
             Style::Openjd => {
                 let percent = 100.0 * self.done as f64 / self.work.frames.max(1) as f64;
-                let lines =
-                    format!("openjd_progress: {percent:.1}\nopenjd_status: frame {frame} {how}{saved}\n");
+                let left = HumanDuration(self.left());
+                let lines = format!(
+                    "openjd_progress: {percent:.1}\nopenjd_status: frame {frame} {how}{saved}, {left} left\n"
+                );
                 // A reader that cannot be reached is no error of the frame's.
                 let _ = say::result(&lines);
             }

@@ -31,7 +31,8 @@ fn open_job_description_reads_its_messages_on_standard_output() {
     assert_eq!(err, "");
     let progress: Vec<&str> = out.lines().filter_map(|l| l.strip_prefix("openjd_progress: ")).collect();
     assert_eq!(progress, ["25.0", "50.0", "75.0", "100.0"]);
-    assert_eq!(out.lines().filter(|l| l.starts_with("openjd_status: frame ")).count(), 4);
+    let status: Vec<&str> = out.lines().filter_map(|l| l.strip_prefix("openjd_status: frame ")).collect();
+    assert!(status.len() == 4 && status.iter().all(|s| s.ends_with(" left")), "{status:?}");
     assert_eq!(out.lines().count(), 4 + 4 + 3);
 }
 
