@@ -20,9 +20,15 @@ pub(super) fn schlick_weights(cosines: Vec4) -> Vec4 {
     x2 * x2 * x
 }
 
-/// The Fresnel term of a smooth dielectric for unpolarised light; `eta` is the index of refraction on the far side over
-/// that on the near side. 1 where everything is reflected.
-pub(super) fn dielectric(cos: f32, eta: f32) -> f32 {
+/// How far the Fresnel term of a smooth dielectric for unpolarised light is from normal incidence (0) to 1, where all is reflected; `eta` is
+/// the index of refraction on the far side over that on the near side.
+pub(super) fn dielectric_weight(cos: f32, eta: f32) -> f32 {
+    let normal = ((eta - 1.0) / (eta + 1.0)).powi(2);
+    (dielectric(cos, eta) - normal) / (1.0 - normal)
+}
+
+/// That term itself.
+fn dielectric(cos: f32, eta: f32) -> f32 {
     let sin2 = (1.0 - cos * cos).max(0.0) / (eta * eta);
     if sin2 >= 1.0 {
         return 1.0;
@@ -37,7 +43,7 @@ pub(super) fn dielectric(cos: f32, eta: f32) -> f32 {
 /// four cosines between view and half vector.
 pub(super) fn grazing(cosines: Vec4, eta: Option<f32>) -> Vec4 {
     match eta {
-        Some(eta) => cosines.map(|cos| dielectric(cos, eta)),
+        Some(eta) => cosines.map(|cos| dielectric_weight(cos, eta)),
         None => schlick_weights(cosines),
     }
 }

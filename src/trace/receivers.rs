@@ -1,6 +1,6 @@
 //! Four points under punctual lights: one light for each of them, or four lights for one that is there four times.
 
-use super::ggx::{dielectric, lobes, schlick_weights};
+use super::ggx::{dielectric_weight, lobes, schlick_weights};
 use super::highlight::{Cut, Glossy, MIN_LOBE};
 use super::interaction::SurfaceInteraction;
 use super::lanes::{LANES, Lanes, Vec3x4};
@@ -153,7 +153,7 @@ impl Receivers {
         if self.bend.is_empty() {
             return weights;
         }
-        let bent = array::from_fn(|lane| dielectric(cosines[lane], self.etas[lane]));
+        let bent = array::from_fn(|lane| dielectric_weight(cosines[lane], self.etas[lane]));
         self.bend.choose(Vec4::from_array(bent), weights)
     }
 }

@@ -1,6 +1,6 @@
 //! What a material says at a point: the inputs of the shading model, textures applied.
 
-use super::ggx::{dielectric, schlick};
+use super::ggx::{dielectric_weight, schlick};
 use super::interaction::SurfaceInteraction;
 use crate::scene::{AlphaMode, MIRROR_ROUGHNESS, Material, TextureRef};
 use glam::{Vec3, Vec4};
@@ -135,9 +135,10 @@ impl Surface {
 
     /// Share of the light that is reflected, for a cosine between view and normal (or half vector).
     pub fn fresnel(&self, cos: f32) -> Vec3 {
-        match self.eta {
-            // Schlick's fit knows no total reflection. A solid reflects by its index alone.
-            Some(eta) => Vec3::splat(dielectric(cos, eta)),
+        match self.eta.map(|eta| dielectric_weight(cos, eta)) {
+            // Schlick's fit knows no total reflection.
+            Some(weight) if weight < 1.0 => self.f0.lerp(Vec3::splat(self.f90), weight),
+            Some(_) => Vec3::ONE,
             None => schlick(self.f0, self.f90, cos),
         }
     }
@@ -145,10 +146,7 @@ impl Surface {
     /// The reflectances between which the Fresnel term lies.
     #[inline]
     pub fn reflectances(&self) -> [Vec3; 2] {
-        match self.eta {
-            Some(_) => [Vec3::ZERO, Vec3::ONE],
-            None => [self.f0, Vec3::splat(self.f90)],
-        }
+        [self.f0, Vec3::splat(self.f90)]
     }
 
     /// Whether lights have highlights on it: not inside a solid, nor where nothing is reflected.

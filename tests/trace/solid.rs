@@ -33,6 +33,28 @@ fn coloured_glass_absorbs_by_distance() {
 }
 
 #[test]
+fn what_is_metal_of_a_solid_reflects_as_metal() {
+    // A mirror in a white room, of which less and less is glass.
+    let seen = |metallic: f32| {
+        let base_color = Vec3::new(1.0, 0.8, 0.2).extend(1.0);
+        let mut scene = floor(Material { metallic, base_color, ..glass() });
+        scene.world.color = Vec3::ONE;
+        Rig::new(scene).center().radiance.specular
+    };
+    for metallic in [0.9f32, 0.99, 0.999] {
+        let (nearly, metal) = (seen(metallic), seen(1.0));
+        assert!(
+            (nearly - metal).abs().max_element() < 1.1 * (1.0 - metallic),
+            "{metallic}: {nearly} {metal}"
+        );
+    }
+    // A dielectric that is said to reflect nothing does not.
+    let dull = Material { specular: 0.0, ..glass() };
+    let pixel = Rig::new(slab(dull)).center();
+    assert!(close(pixel.radiance.total(), Vec3::splat(2.0)), "{:?}", pixel.radiance);
+}
+
+#[test]
 fn a_thin_wall_is_passed_straight_and_tints() {
     let tint = Vec3::new(0.2, 0.5, 0.8);
     let mut scene = floor(glowing(Vec3::splat(2.0)));
