@@ -34,7 +34,7 @@ pub(super) struct Fused {
 
 impl Fused {
     /// Finds what can be fused and builds its tree. Empty where there would be fewer than two groups in it.
-    pub fn new(scene: &Scene, groups: &[Group], uses: &[usize]) -> Self {
+    pub fn new(scene: &Scene, groups: &[Group], uses: &[usize], of_meshes: &[Bounds]) -> Self {
         let pose = scene.pose(scene.timing.time_of(scene.timing.first));
         let moved = scene.moved_nodes();
         let still = |g: &&(usize, &Group)| !g.1.deformable && !moved[g.1.node];
@@ -45,7 +45,7 @@ impl Fused {
             .filter(|(_, g)| place_group(scene, g, &pose, DVec3::ZERO).present)
             .filter_map(|(number, group)| {
                 let m = world_from_object(group, &pose);
-                let (min, max) = world_bounds(scene, group, m)?;
+                let (min, max) = world_bounds(scene, group, m, of_meshes)?;
                 Some((number, m, min, max))
             })
             .collect();
@@ -86,8 +86,7 @@ impl Fused {
                     .iter()
                     .map(|&p| (world_from_object.transform_point3(p.as_dvec3()) - anchor).as_vec3())
                     .collect();
-                let mut bounds = Bounds::default();
-                positions.iter().filter(|p| p.is_finite()).for_each(|&p| bounds.include(p));
+                let bounds = Bounds::of(&positions);
                 instances.push(i);
                 reach.push(if bounds.is_empty() { 0.0 } else { bounds.reach() });
                 posed.push((mesh, positions, world_from_object.matrix3.determinant() < 0.0));
@@ -123,13 +122,15 @@ fn world_from_object(group: &Group, pose: &Pose) -> DAffine3 {
     pose.world_from_node[group.node] * group.node_from_object
 }
 
-/// The box around a group in the world; nothing where it has no finite corner.
-fn world_bounds(scene: &Scene, group: &Group, world_from_object: DAffine3) -> Option<(DVec3, DVec3)> {
+/// The box around a group in the world, from those of all meshes; nothing where it has no finite corner.
+fn world_bounds(
+    scene: &Scene,
+    group: &Group,
+    world_from_object: DAffine3,
+    of_meshes: &[Bounds],
+) -> Option<(DVec3, DVec3)> {
     let mut bounds = Bounds::default();
-    for &i in &group.instances {
-        let mesh = &scene.meshes[scene.instances[i as usize].mesh];
-        mesh.positions.iter().filter(|p| p.is_finite()).for_each(|&p| bounds.include(p));
-    }
+    group.instances.iter().for_each(|&i| bounds.join(of_meshes[scene.instances[i as usize].mesh]));
     let corners = bounds.corners().map(|p| world_from_object.transform_point3(p.as_dvec3()));
     let corners = corners.into_iter().map(|p| (p, p)).reduce(|a, b| (a.0.min(b.0), a.1.max(b.1)));
     corners.filter(|(min, max)| !bounds.is_empty() && min.is_finite() && max.is_finite())

@@ -120,7 +120,10 @@ impl Accel {
         let (groups, meshes) = group(scene);
         let mut uses = vec![0; meshes.len()];
         groups.iter().for_each(|g| uses[g.tree] += 1);
-        let fused = Fused::new(scene, &groups, &uses);
+        // Many instances may share a mesh.
+        let bounds_of_meshes: Vec<Bounds> =
+            scene.meshes.par_iter().map(|mesh| Bounds::of(&mesh.positions)).collect();
+        let fused = Fused::new(scene, &groups, &uses, &bounds_of_meshes);
         fused.groups().for_each(|g| uses[groups[g].tree] -= 1);
         let trees = meshes.par_iter().zip(uses).map(|(meshes, uses)| {
             // Trees that only fused groups would use are not needed.

@@ -61,9 +61,21 @@ impl Default for Bounds {
 }
 
 impl Bounds {
+    /// The box around those of the points that are finite.
+    pub fn of(points: &[Vec3]) -> Self {
+        let mut bounds = Self::default();
+        points.iter().filter(|p| p.is_finite()).for_each(|&p| bounds.include(p));
+        bounds
+    }
+
     pub fn include(&mut self, point: Vec3) {
         self.min = self.min.min(point);
         self.max = self.max.max(point);
+    }
+
+    pub fn join(&mut self, other: Self) {
+        self.min = self.min.min(other.min);
+        self.max = self.max.max(other.max);
     }
 
     pub fn is_empty(&self) -> bool {
