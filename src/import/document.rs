@@ -157,6 +157,14 @@ impl<'a> Element<'a> {
         Ok(array.iter().enumerate().map(item).collect())
     }
 
+    /// Element `index` of the array that is member `key`, where there is one.
+    pub fn item(&self, key: &str, index: usize) -> Result<Option<Element<'a>>> {
+        let Some(member) = self.get(key) else { return Ok(None) };
+        let array = member.value.as_array().ok_or_else(|| member.error("must be an array"))?;
+        let place = || format!("{}/{index}", member.place);
+        Ok(array.get(index).map(|value| Element { document: self.document, value, place: place() }))
+    }
+
     /// This element as a number.
     pub fn as_number(&self) -> Result<f64> {
         self.value.as_f64().filter(|v| v.is_finite()).ok_or_else(|| self.error("must be a number"))

@@ -6,7 +6,7 @@ use crate::{
     scene::{Mesh, Quadric, Shape},
 };
 use glam::DVec3;
-use std::collections::HashMap;
+use std::collections::{HashMap, hash_map::Entry};
 
 /// A larger size or coordinate would overflow where it is squared in single precision.
 const LARGEST: f64 = 1e15;
@@ -21,19 +21,21 @@ impl Shapes {
         let Some(binding) = node.extension("BUZZ_analytic_shape") else { return Ok(None) };
         let material = material(node, &binding)?;
         let new = primitives.len();
-        let (shape, number) = match (binding.index("shape")?, binding.get("quadric")) {
-            (Some(index), None) => {
-                let number = *self.0.entry((index, material)).or_insert(new);
-                (shape(&binding, index)?, number)
-            }
-            (None, Some(_)) => (quadric(&binding)?, new),
+        let shape = match (binding.index("shape")?, binding.get("quadric")) {
+            (Some(index), None) => match self.0.entry((index, material)) {
+                Entry::Occupied(known) => return Ok(Some(*known.get())),
+                Entry::Vacant(slot) => {
+                    let shape = shape(&binding, index)?;
+                    slot.insert(new);
+                    shape
+                }
+            },
+            (None, Some(_)) => quadric(&binding)?,
             _ => return Err(binding.error("needs either `shape`, or `quadric` and `bounds`")),
         };
-        if number == new {
-            let mesh = Mesh { name: node.name(), shape: Some(shape), ..Mesh::default() };
-            primitives.push(Primitive { mesh, material, joints: 0 });
-        }
-        Ok(Some(number))
+        let mesh = Mesh { name: node.name(), shape: Some(shape), ..Mesh::default() };
+        primitives.push(Primitive { mesh, material, joints: 0 });
+        Ok(Some(new))
     }
 }
 
@@ -45,18 +47,17 @@ fn material(node: &Element, binding: &Element) -> Result<Option<usize>> {
     }
     let Some(mesh) = node.index("mesh")? else { return Ok(None) };
     let mesh = node.document.element("meshes", mesh, &node.place)?;
-    mesh.items("primitives")?.first().map_or(Ok(None), |primitive| primitive.index("material"))
+    mesh.item("primitives", 0)?.map_or(Ok(None), |primitive| primitive.index("material"))
 }
 
 /// Shape number `index` of the file.
 fn shape(binding: &Element, index: usize) -> Result<Shape> {
-    let root = binding.document.root();
-    let shapes = match root.extension("KHR_implicit_shapes") {
-        Some(extension) => extension.items("shapes")?,
-        None => Vec::new(),
-    };
-    let Some(element) = shapes.get(index) else {
-        let message = format!("there is no shape {index} in KHR_implicit_shapes, which has {}", shapes.len());
+    let extension = binding.document.root().extension("KHR_implicit_shapes");
+    let element = extension.as_ref().map_or(Ok(None), |extension| extension.item("shapes", index))?;
+    let Some(element) = element else {
+        let count =
+            extension.map_or(Ok(0), |extension| extension.items("shapes").map(|shapes| shapes.len()))?;
+        let message = format!("there is no shape {index} in KHR_implicit_shapes, which has {count}");
         return Err(binding.document.error(binding.place_of("shape"), message));
     };
     let kind = element.text("type")?.unwrap_or_default();
@@ -77,7 +78,7 @@ fn shape(binding: &Element, index: usize) -> Result<Shape> {
                 full = given;
             }
             for side in full {
-                extent(element, side)?;
+                extent(&element, side)?;
             }
             Shape::cuboid(full.into())
         }

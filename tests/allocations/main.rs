@@ -1,6 +1,9 @@
-//! Memory that frames take: all of it is asked for until the first inferred frames are done, and used again by the others.
+//! Memory that frames take: all of it is asked for until the first inferred frames are done, and used again by the others. What reading
+//! a file takes.
 
 #![allow(missing_docs, clippy::unwrap_used, clippy::expect_used, clippy::panic)]
+
+mod files;
 
 use buzz::accel::Accel;
 use buzz::frame::{FrameId, FrameKind, FrameStats};
@@ -11,9 +14,16 @@ use buzz::scene::Scene;
 use buzz::sequence::{Observer, Quality, Settings, render_sequence};
 use std::collections::BTreeSet;
 use std::path::Path;
+use std::sync::{Mutex, MutexGuard, PoisonError};
 
 #[global_allocator]
 static ALLOCATOR: dhat::Alloc = dhat::Alloc;
+
+/// Held by a test that counts: the allocator counts for all threads together.
+fn alone() -> MutexGuard<'static, ()> {
+    static ALONE: Mutex<()> = Mutex::new(());
+    ALONE.lock().unwrap_or_else(PoisonError::into_inner)
+}
 
 /// Blocks that had been allocated in all when each frame was done.
 struct Counter(Vec<u64>);
@@ -46,6 +56,7 @@ fn allocations(scene: &Scene, settings: &Settings) -> Vec<u64> {
 
 #[test]
 fn a_frame_like_the_one_before_allocates_nothing() {
+    let _alone = alone();
     let courtyard = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/courtyard/courtyard.gltf");
     let scene = import(&courtyard, &ImportOptions::default()).unwrap();
     let profiler = dhat::Profiler::builder().testing().build();
