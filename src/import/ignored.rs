@@ -2,7 +2,11 @@
 
 use super::document::{Document, Element};
 use crate::{Error, Result, scene::Ignored};
-use std::{cell::RefCell, collections::HashSet, path::Path};
+use std::{
+    cell::RefCell,
+    collections::{HashMap, HashSet},
+    path::Path,
+};
 
 /// Extensions that are read. Everything else in `extensionsRequired` is refused.
 const READ: &[&str] = &[
@@ -91,16 +95,17 @@ pub(super) fn check_extensions(document: &Document, notes: &Notes) -> Result<()>
         }
     }
     let met = first_uses(document)?;
+    let places: HashMap<&str, &String> = met.iter().map(|(name, place)| (*name, place)).collect();
     let mut listed = HashSet::new();
     for item in document.root().items("extensionsUsed")? {
         let Some(name) = item.value.as_str() else { continue };
-        let place = met.iter().find(|(met, _)| *met == name).map(|(_, place)| place.clone());
-        note_unless_read(name, place.unwrap_or(item.place), notes);
+        let place = places.get(name).map_or(item.place, |place| (*place).clone());
+        note_unless_read(name, place, notes);
         listed.insert(name);
     }
     // Some tools forget to declare what they write.
-    for (name, place) in met.into_iter().filter(|(name, _)| !listed.contains(name)) {
-        note_unless_read(name, place, notes);
+    for (name, place) in met.iter().filter(|(name, _)| !listed.contains(name)) {
+        note_unless_read(name, place.clone(), notes);
     }
     Ok(())
 }
