@@ -18,9 +18,9 @@ impl Pictures {
         Self { most: most.unwrap_or(u64::MAX), taken: Cell::default() }
     }
 
-    /// Takes a picture of so many pixels, four bytes each, and its smaller levels.
-    pub fn take(&self, pixels: usize) -> Result<()> {
-        let bytes = 4 * pixels as u64;
+    /// Takes a picture of so many pixels, so many bytes each, and its smaller levels.
+    pub fn take(&self, pixels: usize, bytes_per_texel: usize) -> Result<()> {
+        let bytes = (pixels as u64).saturating_mul(bytes_per_texel as u64);
         self.taken.set(self.taken.get().saturating_add(bytes).saturating_add(bytes / 3));
         if self.taken.get() <= self.most {
             return Ok(());

@@ -11,6 +11,7 @@ use crate::{
     Result,
     scene::{ColorSpace, Image},
 };
+use bytemuck::{Pod, allocation::cast_slice_box};
 use exr::meta::MetaData;
 use image::{DynamicImage, ImageFormat, ImageReader, Limits, RgbaImage};
 use rayon::prelude::*;
@@ -26,6 +27,10 @@ const MAX_SIDE: u32 = 16384;
 const PIXELS_FLOOR: usize = 1 << 24;
 /// Pixels for each byte of encoded images: deflate packs flat colour a thousand times.
 const PIXELS_PER_BYTE: usize = 1024;
+/// What a texel takes that is kept in 8 bits a channel.
+const BYTES_PER_TEXEL: usize = size_of::<[u8; 4]>();
+/// What one takes that is kept as floats, as those of worlds are.
+const BYTES_PER_FLOAT_TEXEL: usize = size_of::<[f32; 3]>();
 
 /// An image as the scene wants it: which, and how its values are meant.
 pub(super) type Wanted = (usize, ColorSpace);
@@ -83,8 +88,8 @@ impl Images {
         let mut readable = Vec::new();
         for (source, data) in encoded {
             match check_size(&data, &mut pixels) {
-                Ok(count) => {
-                    pictures.take(count)?;
+                Ok(size) => {
+                    pictures.take(size.pixels, BYTES_PER_TEXEL)?;
                     readable.push((source, data));
                 }
                 Err(why) => unreadable(notes, source, &why),
@@ -128,9 +133,7 @@ impl Images {
             .into_par_iter()
             .map(|(name, image, space)| {
                 let (width, height) = image.dimensions();
-                let texels = image.as_raw().as_chunks::<4>().0.to_vec();
-                drop(image);
-                Image::from_rgba8(&name, width, height, texels, space)
+                Image::from_rgba8(&name, width, height, texels(image.into_raw()), space)
             })
             .collect();
         Ok(out)
@@ -221,8 +224,23 @@ fn encoded_bytes(
     })
 }
 
-/// Checks an image's size by its header, and takes it from the pixels that are left. Returns its pixels.
-fn check_size(data: &[u8], pixels: &mut usize) -> Result<usize, String> {
+/// The texels of a picture, in the memory that it has.
+pub(super) fn texels<T: Pod, const N: usize>(channels: Vec<T>) -> Vec<[T; N]>
+where
+    [T; N]: Pod,
+{
+    // Room to grow might not be a whole number of texels.
+    cast_slice_box(channels.into_boxed_slice()).into_vec()
+}
+
+/// What an image's header says.
+struct Size {
+    pixels: usize,
+    is_float: bool,
+}
+
+/// Checks an image's size by its header, and takes it from the pixels that are left.
+fn check_size(data: &[u8], pixels: &mut usize) -> Result<Size, String> {
     let reader = ImageReader::new(Cursor::new(data)).with_guessed_format().map_err(|e| e.to_string())?;
     let format = reader.format();
     let (mut width, mut height) = reader.into_dimensions().map_err(|e| first_line(&e.to_string()))?;
@@ -245,7 +263,8 @@ fn check_size(data: &[u8], pixels: &mut usize) -> Result<usize, String> {
     *pixels = pixels
         .checked_sub(count)
         .ok_or_else(|| format!("{width}x{height} pixels are more than its size justifies"))?;
-    Ok(count)
+    let is_float = matches!(format, Some(ImageFormat::Hdr | ImageFormat::OpenExr));
+    Ok(Size { pixels: count, is_float })
 }
 
 /// True if a JPEG's last scan has no end (ITU-T T.81, B.1.1.3): what decoders take is grey from there.
@@ -274,11 +293,11 @@ fn first_line(message: &str) -> String {
 /// A picture file of an OBJ material; the message says why it cannot be had. An error if `pictures` has no room for it.
 pub(super) fn decode_file(data: &[u8], pictures: &Pictures) -> Result<Result<RgbaImage, String>> {
     let mut pixels = PIXELS_FLOOR.saturating_add(data.len().saturating_mul(PIXELS_PER_BYTE));
-    let count = match check_size(data, &mut pixels) {
-        Ok(count) => count,
+    let size = match check_size(data, &mut pixels) {
+        Ok(size) => size,
         Err(why) => return Ok(Err(why)),
     };
-    pictures.take(count)?;
+    pictures.take(size.pixels, BYTES_PER_TEXEL)?;
     Ok(decode(data).map(DynamicImage::into_rgba8))
 }
 
@@ -290,21 +309,21 @@ pub(super) fn load_world(document: &Document, uri: &str, place: &str, pictures: 
     let mut pixels = PIXELS_FLOOR.saturating_add(data.len().saturating_mul(PIXELS_PER_BYTE));
     let broken =
         |why: String| document.error(place, format!("the image cannot be read ({why}); save it again"));
-    let count = check_size(&data, &mut pixels).map_err(broken)?;
-    pictures.take(count)?;
+    let size = check_size(&data, &mut pixels).map_err(broken)?;
+    pictures.take(size.pixels, if size.is_float { BYTES_PER_FLOAT_TEXEL } else { BYTES_PER_TEXEL })?;
     let image = decode(&data).map_err(broken)?;
     let (width, height) = (image.width(), image.height());
     let name = if uri.starts_with("data:") { "world" } else { uri };
     Ok(match image {
         DynamicImage::ImageRgb32F(_) | DynamicImage::ImageRgba32F(_) => {
-            let mut texels = image.into_rgb32f().into_raw().as_chunks::<3>().0.to_vec();
+            let mut texels: Vec<[f32; 3]> = texels(image.into_rgb32f().into_raw());
             for value in texels.as_flattened_mut().iter_mut().filter(|v| !v.is_finite() || **v < 0.0) {
                 *value = 0.0;
             }
             Image::from_rgb_f32(name, width, height, texels)
         }
         other => {
-            let texels = other.into_rgba8().as_raw().as_chunks::<4>().0.to_vec();
+            let texels = texels(other.into_rgba8().into_raw());
             Image::from_rgba8(name, width, height, texels, ColorSpace::Srgb)
         }
     })

@@ -24,6 +24,11 @@ pub(super) fn levels_of(width: u32, height: u32) -> Vec<Level> {
     levels
 }
 
+/// The texels of all levels.
+pub(super) fn texels_of(levels: &[Level]) -> usize {
+    levels.iter().map(|level| level.width as usize * level.height as usize).sum()
+}
+
 /// Appends level `to`, each texel the average of those of `from` that it covers: two a side, or up to three where
 /// the size is odd.
 pub(super) fn halve<T: Copy>(from: Level, to: Level, texels: &mut Vec<T>, average: impl Fn(&[T]) -> T) {
@@ -32,7 +37,6 @@ pub(super) fn halve<T: Copy>(from: Level, to: Level, texels: &mut Vec<T>, averag
         let last = (u64::from(i + 1) * u64::from(from)).div_ceil(u64::from(to));
         first as usize..last as usize
     };
-    texels.reserve(to.width as usize * to.height as usize);
     let mut block = Vec::with_capacity(9);
     for y in 0..to.height {
         for x in 0..to.width {

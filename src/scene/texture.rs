@@ -1,6 +1,6 @@
 //! Images with mip levels, and how materials look them up.
 
-use super::mip::{LINEAR_FROM_BYTE, LINEAR_FROM_SRGB, Level, average_bytes, halve, levels_of};
+use super::mip::{LINEAR_FROM_BYTE, LINEAR_FROM_SRGB, Level, average_bytes, halve, levels_of, texels_of};
 use glam::{Affine2, Vec2, Vec3, Vec4};
 
 /// Whether an image's values are encoded for display.
@@ -71,6 +71,7 @@ impl Image {
     pub fn from_rgba8(name: &str, width: u32, height: u32, texels: Vec<[u8; 4]>, space: ColorSpace) -> Self {
         let (width, height, mut texels) = whole(width, height, texels, [255; 4]);
         let levels = levels_of(width, height);
+        texels.reserve_exact(texels_of(&levels) - texels.len());
         for pair in levels.windows(2) {
             halve(pair[0], pair[1], &mut texels, |block| average_bytes(block, space));
         }
@@ -90,6 +91,7 @@ impl Image {
             *value = if value.is_finite() { *value } else { 0.0 };
         }
         let levels = levels_of(width, height);
+        texels.reserve_exact(texels_of(&levels) - texels.len());
         for pair in levels.windows(2) {
             halve(pair[0], pair[1], &mut texels, |block| {
                 let sum = block.iter().fold(Vec3::ZERO, |sum, &texel| sum + Vec3::from(texel));

@@ -179,15 +179,20 @@ fn pictures_that_memory_cannot_hold_are_refused_before_they_are_decoded() {
     let mut sky = Gltf::with_triangle();
     sky.json["scenes"][0]["extras"] = json!({"buzz": {"world": {"image": "sky.png"}}});
     fs::write(at("b.gltf"), sky.text()).unwrap();
+    let hdr = image::Rgb32FImage::from_pixel(16, 16, image::Rgb([1.0; 3]));
+    image::DynamicImage::ImageRgb32F(hdr).save(at("sky.hdr")).unwrap();
+    sky.json["scenes"][0]["extras"]["buzz"]["world"]["image"] = json!("sky.hdr");
+    fs::write(at("d.gltf"), sky.text()).unwrap();
     fs::write(at("c.mtl"), "newmtl wood\nmap_Kd wood.png\n").unwrap();
     fs::write(at("c.obj"), "mtllib c.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl wood\nf 1 2 3\n").unwrap();
-    for name in ["a.gltf", "b.gltf", "c.obj"] {
+    // A texel has four bytes, of a world's floats twelve; the smaller levels take a third more.
+    for (name, texel) in [("a.gltf", 4), ("b.gltf", 4), ("c.obj", 4), ("d.gltf", 12)] {
         let with = |picture_bytes| {
             let options = ImportOptions { picture_bytes, turntable: Some(2), ..ImportOptions::default() };
             import(&at(name), &options)
         };
-        assert_eq!(with(Some(16 * 16 * 6)).unwrap().images.len(), 1, "{name}");
-        let error = with(Some(16 * 16 * 5)).unwrap_err();
+        assert_eq!(with(Some(16 * 16 * texel * 3 / 2)).unwrap().images.len(), 1, "{name}");
+        let error = with(Some(16 * 16 * texel * 5 / 4)).unwrap_err();
         assert_eq!(error.exit_code(), 2, "{name}: {error}");
         assert!(error.to_string().contains("pictures take at least"), "{name}: {error}");
     }

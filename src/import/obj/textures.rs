@@ -139,7 +139,7 @@ impl Textures<'_> {
         };
         let loaded = picture.map(|(picture, mode)| {
             let (width, height) = picture.dimensions();
-            let texels = picture.into_raw().as_chunks::<4>().0.to_vec();
+            let texels = image::texels(picture.into_raw());
             self.images.push(Image::from_rgba8(name, width, height, texels, space));
             (self.images.len() - 1, mode)
         });
