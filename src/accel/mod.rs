@@ -47,6 +47,8 @@ pub struct Accel {
     /// Lower trees: shared ones first, then one for each group that is deformed.
     trees: Vec<Tree>,
     groups: Vec<Group>,
+    /// The boxes around the meshes' own vertices.
+    bounds_of_meshes: Vec<Bounds>,
     /// What stands still, in one tree.
     fused: Fused,
     /// The groups that were fused, whether they are visible or not.
@@ -134,6 +136,7 @@ impl Accel {
             origin: DVec3::ZERO,
             trees: trees.collect(),
             still: fused.groups().collect(),
+            bounds_of_meshes,
             fused,
             groups,
             deformed: scene.instances.iter().map(|_| None).collect(),

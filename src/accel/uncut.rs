@@ -10,7 +10,7 @@ const PLANES: usize = 6;
 
 /// A plane relative to the origin of render space: a point is `normal . point + offset` inside.
 #[derive(Clone, Copy)]
-struct Plane {
+pub(super) struct Plane {
     normal: DVec3,
     offset: f64,
 }
@@ -37,27 +37,32 @@ impl Accel {
 
     /// The space between the two views' near planes, and that between their far planes, as far as `new` sees them.
     fn slabs(&self, old: &View, new: &View) -> impl Iterator<Item = Slab> {
-        let corners = [(0, 0), (new.width, 0), (new.width, new.height), (0, new.height)];
-        let rays = corners.map(|(x, y)| new.ray(f64::from(x), f64::from(y)));
-        let inside = rays.iter().map(|ray| ray.origin + ray.direction - self.origin).sum::<DVec3>() / 4.0;
-        let [top, right, bottom, left] = [0, 1, 2, 3].map(|i| {
-            let (a, b) = (rays[i], rays[(i + 1) % 4]);
-            let normal = a.direction.cross(b.origin + b.direction - a.origin).normalize_or_zero();
-            let plane = Plane { normal, offset: -normal.dot(a.origin - self.origin) };
-            if plane.distance(inside) < 0.0 { plane.flipped() } else { plane }
-        });
-        // Inside is what is farther than `depth`.
-        let behind = |view: &View, depth: f64| Plane {
-            normal: view.forward,
-            offset: -view.forward.dot(view.eye - self.origin) - depth,
-        };
-        let near = |view: &View| behind(view, view.lens.near.max(0.0));
-        let far = |view: &View| view.lens.far.is_finite().then(|| behind(view, view.lens.far));
+        let [top, right, bottom, left] = self.sides(new);
+        let near = |view: &View| self.behind(view, view.lens.near.max(0.0));
+        let far = |view: &View| view.lens.far.is_finite().then(|| self.behind(view, view.lens.far));
         let eye = new.eye - self.origin;
         let slab = move |cut, seen| Slab { eye, planes: [top, right, bottom, left, cut, seen] };
         let within = far(new).map_or(Plane { normal: DVec3::ZERO, offset: 0.0 }, Plane::flipped);
         let nearer = slab(near(old).flipped(), near(new));
         [Some(nearer), far(old).map(|cut| slab(cut, within))].into_iter().flatten()
+    }
+
+    /// The planes between which an image shows what it shows, in order around.
+    pub(super) fn sides(&self, view: &View) -> [Plane; 4] {
+        let corners = [(0, 0), (view.width, 0), (view.width, view.height), (0, view.height)];
+        let rays = corners.map(|(x, y)| view.ray(f64::from(x), f64::from(y)));
+        let inside = rays.iter().map(|ray| ray.origin + ray.direction - self.origin).sum::<DVec3>() / 4.0;
+        [0, 1, 2, 3].map(|i| {
+            let (a, b) = (rays[i], rays[(i + 1) % 4]);
+            let normal = a.direction.cross(b.origin + b.direction - a.origin).normalize_or_zero();
+            let plane = Plane { normal, offset: -normal.dot(a.origin - self.origin) };
+            if plane.distance(inside) < 0.0 { plane.flipped() } else { plane }
+        })
+    }
+
+    /// Inside is what is farther than `depth` before the eye of a view.
+    pub(super) fn behind(&self, view: &View, depth: f64) -> Plane {
+        Plane { normal: view.forward, offset: -view.forward.dot(view.eye - self.origin) - depth }
     }
 
     /// Visits what of all triangles lies in a slab.
@@ -101,7 +106,7 @@ impl Accel {
 }
 
 impl Plane {
-    fn distance(&self, point: DVec3) -> f64 {
+    pub fn distance(&self, point: DVec3) -> f64 {
         self.normal.dot(point) + self.offset
     }
 

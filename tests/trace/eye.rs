@@ -3,9 +3,10 @@
 use crate::rig::*;
 use buzz::accel::KnownTriangles;
 use buzz::frame::RayCounts;
-use buzz::scene::{LightKind, Material, Mesh, Projection, Scene, Skin};
-use glam::{DAffine3, DQuat, DVec3, Vec3};
+use buzz::scene::{LightKind, Material, Mesh, MorphTarget, Projection, Scene, Skin};
+use glam::{DAffine3, DMat4, DQuat, DVec3, Vec3};
 use std::f32::consts::PI;
+use std::sync::Mutex;
 
 #[test]
 fn back_faces_are_seen_only_where_double_sided() {
@@ -236,4 +237,57 @@ fn four_pixels_see_a_triangle_as_each_alone() {
         }
     }
     assert!(seen > 1000 && missed > 10, "{seen} {missed}");
+}
+
+/// All tiles of a floor open to an eye that rises through it. Those are visited that the new view shows, and few others.
+#[test]
+fn what_opens_to_the_eye_is_visited_where_it_is_seen() {
+    let parallel = Projection::Orthographic { xmag: 3.0, ymag: 3.0 };
+    for projection in [None, Some(parallel)] {
+        let mut scene = Scene::default();
+        for tile in 0..400 {
+            let (x, z) = (f64::from(tile % 20) - 9.5, f64::from(tile / 20) - 9.5);
+            add_plane(&mut scene, matt(Vec3::ONE), 0.5, at(x, 0.0, z));
+        }
+        // One that a joint brings before the eye, and one that a morph target does.
+        let mut plane = Mesh::plane(0.5, 0);
+        plane.morph_targets =
+            vec![MorphTarget { positions: vec![Vec3::X * 100.0; 4], ..MorphTarget::default() }];
+        let mesh = scene.add_mesh(plane.clone());
+        let morphed = scene.add_instance(mesh, at(-100.0, 0.0, -3.0));
+        scene.nodes[scene.instances[morphed].node].weights = vec![1.0];
+        plane.morph_targets.clear();
+        plane.joints = vec![vec![[0; 4]; 4]];
+        plane.joint_weights = vec![vec![[1.0, 0.0, 0.0, 0.0]; 4]];
+        let mesh = scene.add_mesh(plane);
+        let skinned = scene.add_instance(mesh, at(-100.0, 0.0, -3.0));
+        let joint = scene.add_node("joint", at(0.0, 0.0, -3.0));
+        scene.skins.push(Skin { joints: vec![joint], inverse_bind: vec![DMat4::IDENTITY] });
+        scene.instances[skinned].skin = Some(0);
+        scene.add_camera(DVec3::new(0.0, -0.02, 3.0), DVec3::new(0.0, 0.0, -1.0), 0.6);
+        scene.add_camera(DVec3::new(0.0, 0.02, 3.0), DVec3::new(0.0, 0.0, -1.0), 0.6);
+        for camera in &mut scene.cameras {
+            camera.lens.projection = projection.unwrap_or(camera.lens.projection);
+        }
+        let rig = Rig::new(scene);
+        let (old, new) = (rig.view(), rig.scene.view(&rig.pose, 1, 65, 65));
+        let visited = Mutex::new(Vec::new());
+        rig.accel.turned(&rig.scene, (&old, &new), &|triangle| visited.lock().unwrap().push(triangle));
+        let visited = visited.into_inner().unwrap();
+        let raster_from_world = new.raster_from_world(DVec3::ZERO);
+        let is_seen = |corner: Vec3| {
+            let r = raster_from_world * corner.as_dvec3().extend(1.0);
+            let (x, y) = (r.x / r.w, r.y / r.w);
+            r.w > 0.0 && r.z > 0.0 && (0.0..65.0).contains(&x) && (0.0..65.0).contains(&y)
+        };
+        let mut seen = 0;
+        for instance in 0..rig.scene.instances.len() {
+            let all = rig.accel.posed(&rig.scene, instance).triangles();
+            for triangle in all.filter(|triangle| triangle.iter().any(|&corner| is_seen(corner))) {
+                assert!(visited.contains(&triangle), "{projection:?}: instance {instance}");
+                seen += 1;
+            }
+        }
+        assert!(seen > 100 && visited.len() < 2 * seen, "{projection:?}: {} for {seen}", visited.len());
+    }
 }
