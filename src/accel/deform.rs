@@ -1,7 +1,10 @@
 //! Skinned and morphed meshes at one time (glTF 2.0, 3.7.2.2 and 3.7.3).
 
+use super::Accel;
+use super::tree::{Part, Tree};
 use crate::scene::{Instance, Mesh, Pose, Scene};
 use glam::{Affine3A, DAffine3, DVec3, Mat3A, Vec3, Vec3A, Vec4};
+use std::{collections::HashMap, iter, sync::Arc};
 
 /// Vertices of a deformed instance. Skinned ones stand in render space, morphed ones in object space.
 #[derive(Debug, Clone, Default)]
@@ -56,7 +59,42 @@ pub(super) fn affine(m: DAffine3) -> Affine3A {
     Affine3A { matrix3: Mat3A::from(m.matrix3.as_mat3()), translation: Vec3A::from(m.translation.as_vec3()) }
 }
 
+impl Accel {
+    /// Poses deformable instances and rebuilds the trees of those whose shape has changed. True if any has.
+    pub(super) fn deform(&mut self, scene: &Scene, pose: &Pose) -> bool {
+        // Instances of a mesh that are morphed alike differ in where they stand only.
+        let mut morphed = HashMap::new();
+        let mut changed = false;
+        for group in self.groups.iter().filter(|g| g.deformable) {
+            for &i in &group.instances {
+                let instance = &scene.instances[i as usize];
+                let shape = Shape::of(scene, pose, instance, self.origin);
+                let old = &mut self.deformed[i as usize];
+                if old.as_ref().is_some_and(|d| d.shape == shape) {
+                    continue;
+                }
+                let weights: Vec<u32> = shape.weights.iter().map(|w| w.to_bits()).collect();
+                let posed = || Deformed::with_tree(scene, instance.mesh, shape);
+                let (posed, tree) = match instance.skin {
+                    None => morphed.entry((instance.mesh, weights)).or_insert_with(posed).clone(),
+                    Some(_) => posed(),
+                };
+                (*old, self.trees[group.tree]) = (Some(posed), tree);
+                changed = true;
+            }
+        }
+        changed
+    }
+}
+
 impl Deformed {
+    fn with_tree(scene: &Scene, mesh: usize, shape: Shape) -> (Arc<Self>, Arc<Tree>) {
+        let posed = Self::new(&scene.meshes[mesh], shape);
+        let part = Part { mirrored: posed.shape.mirrored, ..Part::of(mesh, &posed.positions) };
+        let tree = Tree::new(scene, iter::once(part));
+        (Arc::new(posed), Arc::new(tree))
+    }
+
     /// The vertices of `mesh` in `shape`: morphed first, then skinned.
     pub fn new(mesh: &Mesh, shape: Shape) -> Self {
         let mut positions = mesh.positions.clone();

@@ -5,11 +5,12 @@ use super::{Accel, Placement, interpolate, place_group};
 use crate::frame::SurfaceRef;
 use crate::scene::{Mesh, Pose, Scene};
 use glam::{DVec3, Vec3, Vec3A};
+use std::sync::Arc;
 
 /// The scene's surfaces in another pose than the one that rays meet, in the same render space.
 pub struct Displaced {
     placements: Vec<Placement>,
-    deformed: Vec<Option<Deformed>>,
+    deformed: Vec<Option<Arc<Deformed>>>,
 }
 
 impl Accel {
@@ -21,9 +22,13 @@ impl Accel {
                 placements[instance as usize] = place_group(scene, group, pose, self.origin);
             }
         }
-        let deformed = scene.instances.iter().map(|instance| {
-            let shape = is_deformable(scene, instance).then(|| Shape::of(scene, pose, instance, self.origin));
-            shape.map(|shape| Deformed::new(&scene.meshes[instance.mesh], shape))
+        let deformed = scene.instances.iter().zip(&self.deformed).map(|(instance, now)| {
+            let shape =
+                is_deformable(scene, instance).then(|| Shape::of(scene, pose, instance, self.origin))?;
+            Some(match now {
+                Some(now) if now.shape == shape => Arc::clone(now),
+                _ => Arc::new(Deformed::new(&scene.meshes[instance.mesh], shape)),
+            })
         });
         Displaced { placements, deformed: deformed.collect() }
     }

@@ -27,7 +27,7 @@ mod wide;
 
 use crate::frame::SurfaceRef;
 use crate::scene::{Mesh, Pose, Scene};
-use deform::{Deformed, Shape, affine, is_deformable};
+use deform::{Deformed, affine, is_deformable};
 pub use displaced::{Displaced, Posed};
 pub use frustum::Frustum;
 use fused::Fused;
@@ -36,8 +36,9 @@ pub use intersect::{PreparedRay, Ray, RayHit, Sides};
 pub use known::KnownTriangles;
 use placed_shape::PlacedShape;
 use rayon::prelude::*;
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 use std::ops::Range;
+use std::sync::Arc;
 use tree::{Bounds, Built, Part, Tree, build};
 use wide::WideTree;
 
@@ -45,7 +46,7 @@ use wide::WideTree;
 pub struct Accel {
     origin: DVec3,
     /// Lower trees: shared ones first, then one for each group that is deformed.
-    trees: Vec<Tree>,
+    trees: Vec<Arc<Tree>>,
     groups: Vec<Group>,
     /// The boxes around the meshes' own vertices.
     bounds_of_meshes: Vec<Bounds>,
@@ -54,7 +55,7 @@ pub struct Accel {
     /// The groups that were fused, whether they are visible or not.
     still: Vec<usize>,
     /// For each instance: its posed vertices, where it is deformed.
-    deformed: Vec<Option<Box<Deformed>>>,
+    deformed: Vec<Option<Arc<Deformed>>>,
     /// For each instance: where it stands.
     placements: Vec<Placement>,
     /// What can be met, in the order of the upper tree.
@@ -76,7 +77,7 @@ struct Group {
     node_from_object: DAffine3,
     /// Their numbers; all of one node.
     instances: Vec<u32>,
-    /// Skinned or morphed: its tree is its own. Skinned vertices stand in render space already.
+    /// Skinned or morphed: it is one instance, posed before it has a tree. Skinned vertices stand in render space already.
     deformable: bool,
     /// A single analytic shape.
     is_shape: bool,
@@ -130,7 +131,7 @@ impl Accel {
         let trees = meshes.par_iter().zip(uses).map(|(meshes, uses)| {
             // Trees that only fused groups would use are not needed.
             let meshes = if uses > 0 { meshes.as_slice() } else { &[] };
-            Tree::new(scene, meshes.iter().map(|&m| Part::of(m, &scene.meshes[m].positions)))
+            Arc::new(Tree::new(scene, meshes.iter().map(|&m| Part::of(m, &scene.meshes[m].positions))))
         });
         Self {
             origin: DVec3::ZERO,
@@ -174,34 +175,6 @@ impl Accel {
         if moved {
             self.build_upper(scene);
         }
-    }
-
-    /// Poses deformable instances and rebuilds the trees of those whose shape has changed. True if any has.
-    fn deform(&mut self, scene: &Scene, pose: &Pose) -> bool {
-        let mut changed = false;
-        for group in self.groups.iter().filter(|g| g.deformable) {
-            let mut stale = false;
-            for &i in &group.instances {
-                let instance = &scene.instances[i as usize];
-                let shape = Shape::of(scene, pose, instance, self.origin);
-                let old = &mut self.deformed[i as usize];
-                if old.as_ref().is_none_or(|d| d.shape != shape) {
-                    *old = Some(Box::new(Deformed::new(&scene.meshes[instance.mesh], shape)));
-                    stale = true;
-                }
-            }
-            if stale {
-                let parts = group.instances.iter().map(|&i| {
-                    let mesh = scene.instances[i as usize].mesh;
-                    let posed = self.deformed[i as usize].as_ref();
-                    let positions = posed.map_or(scene.meshes[mesh].positions.as_slice(), |d| &d.positions);
-                    Part { mirrored: posed.is_some_and(|d| d.shape.mirrored), ..Part::of(mesh, positions) }
-                });
-                self.trees[group.tree] = Tree::new(scene, parts);
-                changed = true;
-            }
-        }
-        changed
     }
 
     fn build_upper(&mut self, scene: &Scene) {
@@ -297,8 +270,8 @@ impl Accel {
 
     /// Memory that the trees and posed vertices take.
     pub fn memory_bytes(&self) -> u64 {
-        let trees: usize = self.trees.iter().map(Tree::memory_bytes).sum();
-        let deformed: usize = self.deformed.iter().flatten().map(|d| d.memory_bytes()).sum();
+        let trees: usize = unique(&self.trees).map(Tree::memory_bytes).sum();
+        let deformed: usize = unique(self.deformed.iter().flatten()).map(Deformed::memory_bytes).sum();
         let upper = self.upper.memory_bytes() + size_of_val(self.placed.as_slice());
         (trees + self.fused.tree.memory_bytes() + deformed + upper) as u64
     }
@@ -329,6 +302,12 @@ impl Accel {
 pub(crate) fn interpolate(a: Vec3A, b: Vec3A, c: Vec3A, surface: SurfaceRef) -> Vec3A {
     let SurfaceRef { u, v, .. } = surface;
     a * (1.0 - u - v) + b * u + c * v
+}
+
+/// Each of what may be shared, once.
+fn unique<'a, T: 'a>(all: impl IntoIterator<Item = &'a Arc<T>>) -> impl Iterator<Item = &'a T> {
+    let mut known = HashSet::new();
+    all.into_iter().filter(move |&one| known.insert(Arc::as_ptr(one))).map(Arc::as_ref)
 }
 
 /// Sorts instances into groups that share a transform, and finds the sets of meshes that need a tree.

@@ -295,6 +295,28 @@ fn moved_hidden_and_deformed_instances_are_met_where_they_are() {
 }
 
 #[test]
+fn what_is_morphed_alike_is_in_memory_once() {
+    let memory = |instances: usize, weight: fn(usize) -> f32| {
+        let mut scene = Scene::default();
+        scene.add_material(Material::default());
+        let mut ball = Mesh::uv_sphere(1.0, 32, 0);
+        let positions = vec![Vec3::Y; ball.positions.len()];
+        ball.morph_targets = vec![buzz::scene::MorphTarget { positions, ..Default::default() }];
+        let ball = scene.add_mesh(ball);
+        for i in 0..instances {
+            let instance = scene.add_instance(ball, at(3.0 * i as f64, 0.0, 0.0));
+            scene.nodes[scene.instances[instance].node].weights = vec![weight(i)];
+        }
+        let mut accel = Accel::new(&scene);
+        accel.place(&scene, &scene.pose(0.0), DVec3::ZERO);
+        accel.memory_bytes()
+    };
+    let one = memory(1, |_| 0.0);
+    assert!(memory(50, |_| 0.0) < 2 * one && memory(50, |_| 0.5) < 2 * one);
+    assert!(memory(50, |i| i as f32) > 40 * one);
+}
+
+#[test]
 fn what_was_thought_to_stand_still_is_met_where_a_pose_puts_it() {
     let mut scene = Scene::default();
     for x in [0.0, 5.0, 10.0] {
