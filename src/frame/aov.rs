@@ -27,7 +27,7 @@ pub enum Aov {
     Normal,
     /// World position.
     Position,
-    /// Pixels to the next and from the previous frame.
+    /// Pixels to where it is in the next frame, and to where it was in the previous one.
     Motion,
     /// Object tag.
     Object,

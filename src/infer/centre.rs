@@ -15,7 +15,7 @@
 //!
 //! Shadow bits are settled light by light. The points around on the same surface say whether a light reaches it here: where
 //! they agree they are believed; where they do not, the shadow's edge is near and a ray is cast to that light alone, but for
-//! every other pixel whose cell agrees. The bits around a wrong bit disagree with it, so an error does not live on. Shares
+//! every other pixel whose cell agrees. The bits around a wrong bit disagree with it, so an error does not live on while anything moves. Shares
 //! of lights that have a size are carried along with the surface ([`carry`]); where they change fast from point to point,
 //! a few rays renew them.
 

@@ -113,6 +113,11 @@ fn change(frame: &PathFrame, neighbour: &PathFrame, which: usize) -> Change {
     let mut sum = Change::default();
     let mut seen = 0.0;
     for (point, (x, y)) in frame.probe.iter().zip(PathFrame::probe_positions(&frame.view)) {
+        // Parallel rays take no background along: no sample lands there, and inference fills it as it does what has grown.
+        if !point.z.is_finite() && !frame.view.is_perspective() {
+            sum.stretched += 1.0;
+            continue;
+        }
         let shift = point.shifts[which].as_dvec3();
         let Some(at) = on_image(point.position + shift, point.z) else {
             sum.outside += 1.0;

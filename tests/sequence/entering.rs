@@ -4,11 +4,11 @@ use buzz::accel::Accel;
 use buzz::frame::{Aov, Frame, FrameKind};
 use buzz::measure::{Exposure, psnr};
 use buzz::output::MemorySink;
-use buzz::plan::{Plan, Segment};
+use buzz::plan::{LONGEST_SEGMENT, Plan, PlanOptions, Segment, plan};
 use buzz::scene::{
     Channel, Curve, Interpolation, LightKind, Material, Mesh, Projection, Scene, Shape, Target,
 };
-use buzz::sequence::{Quality, Settings, Unwatched, render_sequence};
+use buzz::sequence::{Quality, Settings, Unwatched, camera_path, render_sequence};
 use glam::{DAffine3, DQuat, DVec3, EulerRot, Vec3};
 use std::collections::BTreeSet;
 use std::f64::consts::FRAC_PI_2;
@@ -292,6 +292,19 @@ fn parallel_rays_are_inferred_too() {
             assert!(decibels.iter().all(|&db| db > least), "{name}, {quality:?}: {decibels:?}");
         }
     }
+}
+
+#[test]
+fn a_small_thing_before_a_sky_is_inferred_by_parallel_rays_too() {
+    let mut set = Set::new();
+    set.ball(0.2, DVec3::new(0.3, 0.0, -4.0));
+    let camera = set.camera((0..16u8).map(|i| [0.03 * f32::from(i), 0.0, 0.0]));
+    set.scene.cameras[camera].lens.projection = Projection::Orthographic { xmag: 1.6, ymag: 1.6 };
+    let (mut accel, settings) = (Accel::new(&set.scene), Settings::new(160, 90));
+    let path = camera_path(&set.scene, &mut accel, &settings, &Unwatched).unwrap();
+    let quality = settings.quality;
+    let plan = plan(&path, &[], PlanOptions { quality, longest_segment: LONGEST_SEGMENT, workers: 1 });
+    assert_eq!(plan.keyframes.len(), 1, "{:?}", plan.keyframes);
 }
 
 #[test]
