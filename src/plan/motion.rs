@@ -74,6 +74,13 @@ pub struct Change {
     pub pixels: f64,
 }
 
+impl Step {
+    /// True if both frames show the same.
+    pub fn is_rest(&self) -> bool {
+        [self.forward, self.backward].iter().all(|c| c.pixels <= STILL && c.unseen() + c.moved == 0.0)
+    }
+}
+
 impl Change {
     /// Share that the neighbour does not show.
     pub fn unseen(&self) -> f64 {

@@ -5,7 +5,8 @@ use super::{Change, Step, Weights};
 /// Predictions for the frames inferred outward from one key frame.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Chain {
-    /// Cost of the key frame. Costs are in the mean cost of a frame of the sequence that is traced in full.
+    /// Cost of the key frame, less what it is worth where the image rests. Costs are in the mean cost of a frame of the sequence that is
+    /// traced in full.
     key: f64,
     /// The 1st, 2nd, ... frame after the key, up to where inference becomes dearer than tracing.
     forward: Vec<Inferred>,
@@ -32,6 +33,11 @@ pub struct Range {
     pub last: usize,
 }
 
+/// What a key frame is worth for each frame of the rest that it is in, and at most. While the image rests nothing is cast, so what no
+/// sample has met in the move before stays missing; from a key frame all of it is right.
+const REST: f64 = 0.01;
+const MOST_REST: f64 = 0.25;
+
 impl Chain {
     /// The chains of every possible key frame of a shot with these steps, whose traced pixels take so many shadow rays,
     /// frame by frame. `reach` says for each frame how many before and after it are of interest if it is a key frame.
@@ -53,12 +59,13 @@ impl Chain {
             let worth = priced.take_while(|(cost, _, full)| cost < full);
             worth.map(|(cost, traced, _)| Inferred { traced, cost: cost / unit }).collect()
         };
+        let rests = rests(steps);
         let chain = |key: usize| {
             let after = steps[key..].iter().map(|s| s.forward);
             let before = steps[..key].iter().rev().map(|s| s.backward);
             let [backward, forward] = reach(key);
             Self {
-                key: full(key) / unit,
+                key: full(key) / unit - (REST * rests[key] as f64).min(MOST_REST),
                 forward: predict(&mut (key + 1..).zip(after).take(forward)),
                 backward: predict(&mut (0..key).rev().zip(before).take(backward)),
             }
@@ -80,6 +87,19 @@ impl Chain {
             _ => of(&self.backward),
         }
     }
+}
+
+/// For each frame of a shot: how many others there are that show the same, one after the other.
+fn rests(steps: &[Step]) -> Vec<usize> {
+    let mut rests = Vec::new();
+    let mut first = 0;
+    for frame in 0..=steps.len() {
+        if steps.get(frame).is_none_or(|step| !step.is_rest()) {
+            rests.resize(frame + 1, frame - first);
+            first = frame + 1;
+        }
+    }
+    rests
 }
 
 /// How a sequence's first 0, 1, 2, ... frames are best divided into segments and these into shares that cost no more than a budget:
@@ -236,6 +256,20 @@ mod tests {
         let before = chain.backward[..range.key - range.first].iter();
         let after = chain.forward[..range.last - range.key].iter();
         chain.key + before.chain(after).map(|i| i.cost).sum::<f64>()
+    }
+
+    #[test]
+    fn the_key_frame_is_where_the_image_rests() {
+        let moves = Change { outside: 0.04, pixels: 9.0, ..Change::default() };
+        let step = |moves: Change| Step { forward: moves, backward: moves };
+        let rest = step(Change::default());
+        // A move between two rests, the second of which is longer.
+        let steps = [[rest; 6].as_slice(), &[step(moves); 8], &[rest; 20]].concat();
+        assert_eq!(rests(&steps)[..16], [6, 6, 6, 6, 6, 6, 6, 0, 0, 0, 0, 0, 0, 0, 20, 20]);
+        let unit = Weights::traced_cost(2.0);
+        let chains = Chain::of_shot(&steps, &[2.0; 35], |_| [64, 64], &Weights::CENTRED, unit);
+        let shares = divide(&chains, 1);
+        assert!(matches!(shares[0].ranges[..], [Range { key: 14.., first: 0, last: 34 }]), "{shares:?}");
     }
 
     #[test]
