@@ -188,9 +188,32 @@ impl ShearedRay {
         }
         let inverse = Vec4::ONE / sum;
         let t = (wa * a[2] + wb * b[2] + wc * c[2]) * inverse * sz;
-        let met = inside & t.cmpge(Vec4::splat(t_min)) & t.cmple(Vec4::splat(t_max));
+        let mut met = inside & t.cmpge(Vec4::splat(t_min)) & t.cmple(Vec4::splat(t_max));
+        if met.any() {
+            let largest = |axis: usize| a[axis].abs().max(b[axis].abs()).max(c[axis].abs());
+            let weight = wa.abs().max(wb.abs()).max(wc.abs());
+            let doubtful = met & t.cmplt(rounding([0, 1, 2].map(largest), weight) * (inverse * sz).abs());
+            if doubtful.any() {
+                met &= !doubtful | self.by_plane(corners).cmpge(Vec4::splat(t_min));
+            }
+        }
         let (u, v) = (wb * inverse, wc * inverse);
         PackHits { mask: met.bitmask(), t, u, v, front: sum.cmpgt(zero).bitmask() }
+    }
+
+    /// Where the ray meets the planes of triangles. Weights sum up to next to nothing on slivers, and where these are seen from their edge: a
+    /// ray that leaves one would meet those beside it, which are behind it, were it not for this.
+    #[cold]
+    fn by_plane(&self, corners: &[[Vec4; 3]; 3]) -> Vec4 {
+        let [sx, sy, sz] = self.shear;
+        let [a, b, c] = corners.each_ref().map(|corner| {
+            let axis = |i: usize| corner[self.axes[i]] - self.origin[i];
+            [axis(0), axis(1), axis(2)]
+        });
+        let [p, q] = [b, c].map(|corner| [corner[0] - a[0], corner[1] - a[1], corner[2] - a[2]]);
+        let normal = [p[1] * q[2] - p[2] * q[1], p[2] * q[0] - p[0] * q[2], p[0] * q[1] - p[1] * q[0]];
+        let height = normal[0] * a[0] + normal[1] * a[1] + normal[2] * a[2];
+        height * sz / (normal[0] * sx + normal[1] * sy + normal[2])
     }
 
     /// The hit on one triangle, of which each axis has the coordinates of all corners, with `t_min <= t <= t_max`:
@@ -212,9 +235,32 @@ impl ShearedRay {
         let inverse = 1.0 / sum;
         let weighed = weights * z;
         let t = (weighed.x + weighed.y + weighed.z) * inverse * sz.x;
-        let met = t >= t_min && t <= t_max;
+        let largest = |v: Vec4| Vec4::splat(v.truncate().abs().max_element());
+        let is_doubtful = || {
+            let rounding = rounding([x, y, z].map(largest), largest(weights)).x;
+            t < rounding * (inverse * sz.x).abs()
+        };
+        let is_before = || {
+            let corner = |lane: usize| corners.map(|axis| Vec4::splat(axis[lane]));
+            self.by_plane(&[corner(0), corner(1), corner(2)]).x >= t_min
+        };
+        let met = t >= t_min && t <= t_max && (!is_doubtful() || is_before());
         met.then_some(TriangleHit { t, u: weights.y * inverse, v: weights.z * inverse, front: sum > 0.0 })
     }
+}
+
+/// How far rounding may take the sum of corners' depths, each with its weight, where no sheared coordinate is over `largest` and no weight over
+/// `weight` (Pharr, Jakob, Humphreys: Physically Based Rendering, 3rd edition, 3.9.6).
+#[inline(always)]
+fn rounding(largest: [Vec4; 3], weight: Vec4) -> Vec4 {
+    let [x, y, z] = largest;
+    const fn gamma(operations: f32) -> f32 {
+        let n = operations * 0.5 * f32::EPSILON;
+        n / (1.0 - n)
+    }
+    let (dx, dy, dz) = ((x + z) * gamma(5.0), (y + z) * gamma(5.0), z * gamma(3.0));
+    let edge = 2.0 * (x * y * gamma(2.0) + dy * x + dx * y);
+    3.0 * (weight * z * gamma(3.0) + edge * z + dz * weight)
 }
 
 /// The axes of a ray's own frame: the third is the direction's longest, the others keep a triangle's winding.

@@ -44,6 +44,32 @@ fn placed(mesh: Mesh, world_from_object: DAffine3) -> (Scene, Pose, Accel) {
 }
 
 #[test]
+fn slivers_throw_no_shadow_on_each_other() {
+    // A floor of triangles ten metres long and a tenth of a millimetre wide.
+    let count = 100_000u32;
+    let mut mesh = Mesh::default();
+    for i in 0..=count {
+        let z = 10.0 * i as f32 / count as f32 - 5.0;
+        mesh.positions.extend([Vec3::new(-5.0, 0.0, z), Vec3::new(5.0, 0.0, z)]);
+    }
+    mesh.triangles = (0..count).flat_map(|i| [[0, 2, 1], [1, 2, 3]].map(|t| t.map(|c| 2 * i + c))).collect();
+    let turned = DAffine3::from_quat(DQuat::from_euler(glam::EulerRot::XYZ, 0.3, 0.7, -0.2));
+    for world_from_object in [DAffine3::IDENTITY, turned] {
+        let (scene, _, accel) = placed(mesh.clone(), world_from_object);
+        for i in 0..400 {
+            let from = Vec3::new((i % 20) as f32 * 0.5 - 4.75, 1e-5, (i / 20) as f32 * 0.5 - 4.75);
+            let towards = Vec3::new(1.0, 3.0, 1.0) - from;
+            let [from, towards] = [
+                world_from_object.as_affine3a().transform_point3(from),
+                world_from_object.as_affine3a().transform_vector3(towards),
+            ];
+            let hit = accel.intersect(&scene, &ray(from, towards, 1.0), Sides::Both);
+            assert!(hit.is_none(), "{i}: {hit:?}");
+        }
+    }
+}
+
+#[test]
 fn no_ray_slips_between_triangles() {
     for rough in [false, true] {
         let turned =
