@@ -39,6 +39,7 @@ use rayon::prelude::*;
 use std::collections::{HashMap, HashSet};
 use std::ops::Range;
 use std::sync::Arc;
+pub(crate) use tree::scrambled;
 use tree::{Bounds, Built, Part, Tree, build};
 use wide::WideTree;
 

@@ -198,7 +198,7 @@ pub(super) fn build(bounds: &[Bounds], reach: f32, most: usize) -> Built {
 }
 
 /// Bits that have nothing to do with those of the next number (Wellons' `lowbias32`).
-fn scrambled(number: u32) -> u32 {
+pub(crate) fn scrambled(number: u32) -> u32 {
     let mut x = number;
     x = (x ^ x >> 16).wrapping_mul(0x7feb_352d);
     x = (x ^ x >> 15).wrapping_mul(0x846c_a68b);

@@ -252,8 +252,7 @@ impl ShearedRay {
 /// How far rounding may take the sum of corners' depths, each with its weight, where no sheared coordinate is over `largest` and no weight over
 /// `weight` (Pharr, Jakob, Humphreys: Physically Based Rendering, 3rd edition, 3.9.6).
 #[inline(always)]
-fn rounding(largest: [Vec4; 3], weight: Vec4) -> Vec4 {
-    let [x, y, z] = largest;
+fn rounding([x, y, z]: [Vec4; 3], weight: Vec4) -> Vec4 {
     const fn gamma(operations: f32) -> f32 {
         let n = operations * 0.5 * f32::EPSILON;
         n / (1.0 - n)

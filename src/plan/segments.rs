@@ -33,8 +33,8 @@ pub struct Range {
     pub last: usize,
 }
 
-/// What a key frame is worth for each frame of the rest that it is in, and at most. While the image rests nothing is cast, so what no
-/// sample has met in the move before stays missing; from a key frame all of it is right.
+/// What a key frame is worth for each other frame of the rest that it is in, and at most, in what it costs more than to infer it would. While the
+/// image rests nothing is cast, so what no sample has met in the move before stays missing; from a key frame all of it is right.
 const REST: f64 = 0.01;
 const MOST_REST: f64 = 0.25;
 
@@ -60,12 +60,16 @@ impl Chain {
             worth.map(|(cost, traced, _)| Inferred { traced, cost: cost / unit }).collect()
         };
         let rests = rests(steps);
+        let worth = |frame: usize| {
+            let more = full(frame) - weights.predicted_cost(0.0, shadow_rays[frame]);
+            (REST * rests[frame] as f64).min(MOST_REST) * more.max(0.0)
+        };
         let chain = |key: usize| {
             let after = steps[key..].iter().map(|s| s.forward);
             let before = steps[..key].iter().rev().map(|s| s.backward);
             let [backward, forward] = reach(key);
             Self {
-                key: full(key) / unit - (REST * rests[key] as f64).min(MOST_REST),
+                key: (full(key) - worth(key)) / unit,
                 forward: predict(&mut (key + 1..).zip(after).take(forward)),
                 backward: predict(&mut (0..key).rev().zip(before).take(backward)),
             }
@@ -270,6 +274,12 @@ mod tests {
         let chains = Chain::of_shot(&steps, &[2.0; 35], |_| [64, 64], &Weights::CENTRED, unit);
         let shares = divide(&chains, 1);
         assert!(matches!(shares[0].ranges[..], [Range { key: 14.., first: 0, last: 34 }]), "{shares:?}");
+        // However little a frame costs there, beside others, it is no reason to trace more of them.
+        let rays: Vec<f64> = (0..35).map(|frame| if frame < 14 { 40.0 } else { 0.0 }).collect();
+        let chains =
+            Chain::of_shot(&steps, &rays, |_| [64, 64], &Weights::CENTRED, Weights::traced_cost(16.0));
+        let resting = |range: &Range| range.key >= 14;
+        assert_eq!(divide(&chains, 1)[0].ranges.iter().filter(|&range| resting(range)).count(), 1);
     }
 
     #[test]

@@ -1,5 +1,6 @@
 //! Points that fill a square evenly, and what they are mapped to.
 
+use crate::accel::scrambled;
 use glam::{Vec2, Vec3, vec2};
 use std::f32::consts::FRAC_PI_4;
 
@@ -32,12 +33,9 @@ fn scramble(bits: u32, seed: u32) -> u32 {
     x.reverse_bits()
 }
 
-/// Mixes a number into a seed (Wellons' `lowbias32` as the finaliser).
+/// Mixes a number into a seed.
 pub(super) fn hash(seed: u32, number: u32) -> u32 {
-    let mut x = seed ^ number.wrapping_mul(0x9e37_79b9);
-    x = (x ^ x >> 16).wrapping_mul(0x7feb_352d);
-    x = (x ^ x >> 15).wrapping_mul(0x846c_a68b);
-    x ^ x >> 16
+    scrambled(seed ^ number.wrapping_mul(0x9e37_79b9))
 }
 
 /// From the unit square to the unit disc, equal areas to equal areas (Shirley and Chiu 1997).
