@@ -51,6 +51,31 @@ def test_ids_and_names_agree(frame: Path) -> None:
     assert len(tags) > 5
 
 
+def test_super_sampled_mattes_cover_what_the_picture_shows(tmp_path: Path) -> None:
+    """Ids are covered by the samples that colours are the mean of: exact shares of a pixel, most first, no more than all of it."""
+    layers = ["CryptoObject", "CryptoMaterial"]
+    convert(COURTYARD, tmp_path, "-r", "160x90", "-f", "70", "--aov", "object,crypto", "--aa", "3", "--transparent")
+    path = tmp_path / "courtyard.0070.exr"
+    channels = read_exr(path)
+    spec = oiio.ImageBuf(str(path)).spec()
+    for layer in layers:
+        known = {np.float32(number) for number in manifest(spec, layer).values()}
+        ids = np.stack([channels[f"{layer}{k:02}.{c}"] for k in range(3) for c in "RB"])
+        shares = np.stack([channels[f"{layer}{k:02}.{c}"] for k in range(3) for c in "GA"])
+        assert (np.diff(shares, axis=0) <= 0).all() and (shares.sum(axis=0) <= 1).all()
+        assert ((ids == 0) == (shares == 0)).all() and set(np.unique(ids[ids != 0])) <= known
+        # Corners of the finest cells weigh a 64th of the pixel.
+        assert (shares * 64 == np.round(shares * 64)).all()
+        for one, other in [(a, b) for a in range(6) for b in range(a)]:
+            assert (ids[one] != ids[other])[shares[one] > 0].all()
+        partly = ((shares[0] > 0) & (shares[0] < 1)).mean()
+        assert 0.05 < partly < 0.5, partly
+        assert ((shares[1] > 0) & (channels["objectId.id"] > 0)).any()
+        # Nothing in courtyard is seen through, so what covers a pixel makes it opaque; few show more than six things.
+        covered, fits = shares.sum(axis=0), shares[5] == 0
+        assert (covered <= channels["A"]).all() and (covered == channels["A"])[fits].all() and fits.mean() > 0.99
+
+
 BLENDER = """
 import json, sys, bpy
 bpy.ops.wm.read_factory_settings(use_empty=True)

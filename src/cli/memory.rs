@@ -87,7 +87,7 @@ fn rendering(job: &Job) -> u64 {
     let lights = scene.lights.len();
     let inference = held_per_pixel(scene, settings);
     // One frame is filled while others are encoded; a file is at most as large as the layers that it is made of.
-    let frame = settings.aovs.bytes_per_pixel(lights);
+    let frame = settings.aovs.bytes_per_pixel(lights, settings.aa);
     let frames = (ExrSink::IN_FLIGHT + 1) * frame + ExrSink::IN_FLIGHT * frame;
     (settings.window.pixels() * (inference + frames)) as u64 + job.threads as u64 * BYTES_PER_THREAD
 }

@@ -59,8 +59,8 @@ impl Aov {
         Self::Crypto,
     ];
 
-    /// Bytes that a pixel of the layer takes in a [`Frame`], where there are so many lights.
-    fn bytes_per_pixel(self, lights: usize) -> usize {
+    /// Bytes that a pixel of the layer takes in a [`Frame`], where there are so many lights and levels of super-sampling.
+    fn bytes_per_pixel(self, lights: usize, levels: u32) -> usize {
         match self {
             Self::Class => size_of::<u8>(),
             Self::Depth => size_of::<f32>(),
@@ -70,8 +70,8 @@ impl Aov {
                 size_of::<[f32; 3]>()
             }
             Self::Lights => lights * size_of::<[f32; 3]>(),
-            // Objects and materials: two ranks of identifier and coverage in the file; less in the frame, a number.
-            Self::Crypto => 2 * size_of::<[f32; 4]>(),
+            // Objects and materials, as in the file, where layers hold two ranks of identifier and coverage; not more in the frame.
+            Self::Crypto => 2 * Matte::ranks(levels).div_ceil(2) * size_of::<[f32; 4]>(),
         }
     }
 }
@@ -92,10 +92,11 @@ impl AovSet {
         self.0 & 1 << aov as u16 != 0
     }
 
-    /// Bytes that a pixel of a [`Frame`] with these layers takes, the beauty included, where there are so many lights.
-    pub fn bytes_per_pixel(self, lights: usize) -> usize {
+    /// Bytes that a pixel of a [`Frame`] with these layers takes, the beauty included, where there are so many lights and levels of
+    /// super-sampling.
+    pub fn bytes_per_pixel(self, lights: usize, levels: u32) -> usize {
         let layers = Aov::ALL.into_iter().filter(|&aov| self.contains(aov));
-        size_of::<[f32; 4]>() + layers.map(|aov| aov.bytes_per_pixel(lights)).sum::<usize>()
+        size_of::<[f32; 4]>() + layers.map(|aov| aov.bytes_per_pixel(lights, levels)).sum::<usize>()
     }
 }
 
@@ -125,15 +126,33 @@ impl Window {
     }
 }
 
-/// Which of several named things each pixel shows.
+/// Which of several named things each pixel shows, and how much of it they cover.
 #[derive(Debug, Clone)]
 pub struct Matte {
     /// Name of the layer.
     pub layer: &'static str,
-    /// The things' names, the same in all frames.
+    /// The things' names, each once and the same in all frames.
     pub names: Arc<[String]>,
-    /// For each pixel a position in `names`, counted from 1; 0 for the background.
-    pub index: Vec<u32>,
+    /// How many things a pixel can show.
+    pub ranks: usize,
+    /// For each pixel its `ranks`, what covers most of it first.
+    pub covers: Vec<Cover>,
+}
+
+/// A thing that a pixel shows.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Cover {
+    /// Its position in [`Matte::names`], counted from 1; 0 for nothing.
+    pub name: u32,
+    /// The share of the pixel that it covers, 0 to 1.
+    pub share: f32,
+}
+
+impl Matte {
+    /// How many things a pixel can show with so many levels of super-sampling: that at its centre, or the six that are usual.
+    pub fn ranks(levels: u32) -> usize {
+        if levels > 1 { 6 } else { 1 }
+    }
 }
 
 /// A finished frame: `window.pixels()` values in each layer, rows from the top; layers not asked for are empty.

@@ -9,7 +9,7 @@ mod quality;
 mod sample;
 mod stats;
 
-pub use aov::{Aov, AovSet, Frame, FrameKind, Matte, Window};
+pub use aov::{Aov, AovSet, Cover, Frame, FrameKind, Matte, Window};
 pub use class::PixelClass;
 pub use eye::{FrameId, StereoEye};
 pub use four::FourPoints;

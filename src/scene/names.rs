@@ -1,30 +1,20 @@
 //! Names of what can be told apart in a picture: what mattes are picked by.
 
-use super::Scene;
+use super::{Instance, Scene};
 
 impl Scene {
-    /// The name of each object: that of tag 1 first. Objects are named after their nodes, so that those which a node places
+    /// The name of the object that an instance belongs to. Objects are named after their nodes, so that those which a node places
     /// many times (`EXT_mesh_gpu_instancing`) share a name.
-    pub fn object_names(&self) -> Vec<String> {
-        let count = self.instances.iter().map(|i| i.object).max().unwrap_or(0);
-        let mut names: Vec<String> = (1..=count).map(|tag| format!("object {tag}")).collect();
-        for instance in &self.instances {
-            let named = &self.nodes[instance.node].name;
-            if let Some(name) = (instance.object as usize).checked_sub(1).and_then(|i| names.get_mut(i))
-                && !named.is_empty()
-            {
-                name.clone_from(named);
-            }
-        }
-        names
+    pub fn object_name(&self, instance: &Instance) -> String {
+        let name = &self.nodes[instance.node].name;
+        if name.is_empty() { format!("object {}", instance.object) } else { name.clone() }
     }
 
-    /// The name of each material.
-    pub fn material_names(&self) -> Vec<String> {
-        let name = |(i, name): (usize, &String)| {
-            if name.is_empty() { format!("material {i}") } else { name.clone() }
-        };
-        self.materials.iter().map(|m| &m.name).enumerate().map(name).collect()
+    /// The name of an instance's material.
+    pub fn material_name(&self, instance: &Instance) -> String {
+        let number = self.meshes[instance.mesh].material;
+        let name = &self.materials[number].name;
+        if name.is_empty() { format!("material {number}") } else { name.clone() }
     }
 }
 
@@ -38,14 +28,16 @@ mod tests {
     fn objects_are_named_after_their_nodes() {
         let mut scene = Scene::default();
         let grey = scene.add_material(Material::default());
-        scene.add_material(Material { name: "Gold".into(), ..Material::default() });
-        let plane = scene.add_mesh(Mesh::plane(1.0, grey));
-        let first = scene.add_instance(plane, DAffine3::IDENTITY);
-        scene.add_instance(plane, DAffine3::IDENTITY);
+        let gold = scene.add_material(Material { name: "Gold".into(), ..Material::default() });
+        let floor = scene.add_mesh(Mesh::plane(1.0, grey));
+        let ring = scene.add_mesh(Mesh::plane(1.0, gold));
+        let first = scene.add_instance(floor, DAffine3::IDENTITY);
+        scene.add_instance(ring, DAffine3::IDENTITY);
         let node = scene.instances[first].node;
         scene.nodes[node].name = "Floor".into();
-        assert_eq!(scene.object_names(), ["Floor", "object 2"]);
-        assert_eq!(scene.material_names(), ["material 0", "Gold"]);
-        assert!(Scene::default().object_names().is_empty());
+        let names =
+            |i: usize| (scene.object_name(&scene.instances[i]), scene.material_name(&scene.instances[i]));
+        assert_eq!(names(0), ("Floor".into(), "material 0".into()));
+        assert_eq!(names(1), ("object 2".into(), "Gold".into()));
     }
 }

@@ -73,10 +73,14 @@ impl Antialias {
         counts
     }
 
+    /// The samples that were shaded last, of `buffer` and more.
+    pub fn samples<'a>(&'a self, buffer: &'a BuzzBuffer) -> Samples<'a> {
+        Samples { pixels: buffer, lattice: buffer.finer.lattice(), levels: &self.shaded.levels }
+    }
+
     /// Visits the samples that a pixel is the mean of, by number, with their weights.
-    fn visit(&self, buffer: &BuzzBuffer, pixel: usize, mut visit: impl FnMut(usize, f32)) {
-        let lattice = buffer.finer.lattice();
-        let samples = Samples { pixels: buffer, lattice, levels: &self.shaded.levels };
+    pub fn visit(&self, buffer: &BuzzBuffer, pixel: usize, mut visit: impl FnMut(usize, f32)) {
+        let samples = self.samples(buffer);
         let (x, y) = (pixel % buffer.width(), pixel / buffer.width());
         let cells = [[x, y], [x + 1, y], [x, y + 1], [x + 1, y + 1]];
         let is_divided = |&cell: &[usize; 2]| samples.levels[0].cells.is_divided(cell);
@@ -223,8 +227,7 @@ impl Resolver<'_> {
         pixel: usize,
         light: usize,
     ) -> [f32; 3] {
-        let lattice = buffer.finer.lattice();
-        let samples = Samples { pixels: buffer, lattice, levels: &antialias.shaded.levels };
+        let samples = antialias.samples(buffer);
         let mut mean = glam::Vec3::ZERO;
         antialias.visit(buffer, pixel, |number, weight| {
             let (sample, lit) = samples.get(number);

@@ -4,6 +4,7 @@
 
 mod antialias;
 mod caster;
+mod mattes;
 mod motion;
 mod outward;
 mod path;
@@ -23,8 +24,8 @@ use crate::plan::{Plan, Segment};
 use crate::scene::{Requirements, Scene, Stereo};
 use crate::trace::{TraceOptions, Tracer, lit_words};
 use antialias::Antialias;
+use mattes::MatteNames;
 use outward::Stage;
-use resolve::MatteNames;
 use segment::SegmentRenderer;
 use shot::Shot;
 use std::collections::BTreeSet;

@@ -1,16 +1,16 @@
 //! From samples to a frame's layers: the paper's enhancement of every pixel, traced or reused alike.
 
 use super::antialias::Antialias;
+use super::mattes::MatteNames;
 use super::{Observer, Settings};
 use crate::accel::Displaced;
-use crate::frame::{Aov, Frame, FrameKind, FrameStats, Matte, RayCounts, SurfaceSample, Window};
+use crate::frame::{Aov, Frame, FrameKind, FrameStats, RayCounts, SurfaceSample, Window};
 use crate::infer::BuzzBuffer;
 use crate::scene::{Scene, View};
 use crate::trace::{Eye, KnownLight, Radiance, SHADED_AT_ONCE, Shader, Tracer};
 use glam::{DMat4, DVec3, Vec3, Vec4};
 use rayon::iter::Either;
 use rayon::prelude::*;
-use std::sync::Arc;
 
 /// Everything that a pixel's final values depend on besides its sample.
 pub(super) struct Resolver<'a> {
@@ -33,18 +33,6 @@ pub(super) struct Resolver<'a> {
     pub known: Option<&'a KnownLight<'a>>,
     /// Names for mattes; none where not asked for.
     pub names: Option<&'a MatteNames>,
-}
-
-/// What mattes are picked by.
-pub(super) struct MatteNames {
-    objects: Arc<[String]>,
-    materials: Arc<[String]>,
-}
-
-impl MatteNames {
-    pub fn of(scene: &Scene) -> Self {
-        Self { objects: scene.object_names().into(), materials: scene.material_names().into() }
-    }
 }
 
 /// The layers of one pixel that come from shading.
@@ -119,7 +107,7 @@ impl<'a> Resolver<'a> {
                 _ => self.mean_light(buffer, antialias, i, number).map(|value| value * self.gain),
             });
         }
-        self.fill_mattes(buffer, &mut frame.mattes);
+        self.fill_mattes(buffer, antialias, &mut frame.mattes);
         counts
     }
 
@@ -136,25 +124,6 @@ impl<'a> Resolver<'a> {
                 let first = chunk * FILLED_AT_ONCE;
                 texels.iter_mut().zip(first..).for_each(|(texel, i)| *texel = value(i));
             }
-        });
-    }
-
-    fn fill_mattes(&self, buffer: &BuzzBuffer, mattes: &mut Vec<Matte>) {
-        mattes.clear();
-        let Some(names) = self.names else { return };
-        let pixels = self.settings.window.pixels();
-        let mut add = |layer, names: &Arc<[String]>, number: &(dyn Fn(&SurfaceSample) -> u32 + Sync)| {
-            let mut index = Vec::new();
-            self.fill(&mut index, pixels, |i| {
-                let sample = buffer.sample(i);
-                if sample.surface.is_background() { 0 } else { number(&sample) }
-            });
-            mattes.push(Matte { layer, names: Arc::clone(names), index });
-        };
-        add("CryptoObject", &names.objects, &|sample| sample.object);
-        add("CryptoMaterial", &names.materials, &|sample| {
-            let mesh = self.scene.instances[sample.surface.instance as usize].mesh;
-            self.scene.meshes[mesh].material as u32 + 1
         });
     }
 

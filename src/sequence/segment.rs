@@ -2,8 +2,9 @@
 
 use super::antialias::Antialias;
 use super::caster::{Caster, mix};
+use super::mattes::MatteNames;
 use super::motion::SceneMotion;
-use super::resolve::{MatteNames, Neighbour, Resolver, count_hidden, empty_frame};
+use super::resolve::{Neighbour, Resolver, count_hidden, empty_frame};
 use super::shot::Shot;
 use super::{FrameSink, Observer, Settings, go_on};
 use crate::Result;

@@ -1,7 +1,7 @@
 //! The files that frames become: read back by the `exr` crate, and by Python's OpenEXR and OpenImageIO.
 
 use crate::support::{Shape, default_layers, frame, hash, options};
-use buzz::frame::{Frame, FrameId, FrameKind, StereoEye, Window};
+use buzz::frame::{Cover, Frame, FrameId, FrameKind, StereoEye, Window};
 use buzz::output::exr::encode;
 use buzz::output::{Compression, ExrSink, FrameFile, NamePattern, OutputFolder, SettingsHasher};
 use buzz::sequence::FrameSink;
@@ -59,16 +59,14 @@ fn expected_channels(frame: &Frame) -> Vec<Expected> {
         ("CryptoMaterial", [0, 0xaaf3_7ff8, 0x65c6_1f66, 0].map(f32::from_bits)),
     ];
     for ((layer, ids), matte) in ids.iter().zip(&frame.mattes) {
-        let covered = |i: &u32| f32::from(*i > 0);
-        let nothing = vec![0.0; matte.index.len()];
-        let values = [
-            matte.index.iter().map(|&i| ids[i as usize]).collect(),
-            matte.index.iter().map(covered).collect(),
-            nothing.clone(),
-            nothing,
-        ];
-        for (color, values) in ["R", "G", "B", "A"].into_iter().zip(values) {
-            all.push((format!("{layer}00.{color}"), false, values));
+        // Two ranks to a layer, the second of which may be empty.
+        for rank in 0..matte.ranks.next_multiple_of(2) {
+            let cover = |pixel: &[Cover]| pixel.get(rank).copied().unwrap_or_default();
+            let covers = || matte.covers.chunks(matte.ranks).map(cover);
+            let [id, share] = if rank % 2 == 0 { ["R", "G"] } else { ["B", "A"] };
+            let name = |color| format!("{layer}{:02}.{color}", rank / 2);
+            all.push((name(id), false, covers().map(|cover| ids[cover.name as usize]).collect()));
+            all.push((name(share), false, covers().map(|cover| cover.share).collect()));
         }
     }
     let two = [(["forward.u", "forward.v"], &frame.forward), (["backward.u", "backward.v"], &frame.backward)];

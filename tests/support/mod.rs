@@ -3,7 +3,7 @@
 #![allow(dead_code)] // Not every test uses everything.
 
 use buzz::frame::{
-    Frame, FrameKind, FrameStats, Matte, PixelClass, RayCounts, StageSeconds, SubPixelCounts, Window,
+    Cover, Frame, FrameKind, FrameStats, Matte, PixelClass, RayCounts, StageSeconds, SubPixelCounts, Window,
 };
 use buzz::output::{Compression, FileOptions, SettingsHash, SettingsHasher};
 use buzz::scene::{Lens, Projection, Rational, View};
@@ -55,6 +55,10 @@ pub fn frame(number: i64, kind: FrameKind, shape: &Shape) -> Frame {
     };
     let three = |c: usize| (0..n).map(|i| [at(i, c), at(i, c + 1), at(i, c + 2)]).collect::<Vec<_>>();
     let two = |c: usize| (0..n).map(|i| [at(i, c) * 8.0 - 4.0, at(i, c + 1) - 0.5]).collect::<Vec<_>>();
+    let cover = |name: usize, k: usize| Cover {
+        name: name as u32,
+        share: if name == 0 { 0.0 } else { 0.5 / k as f32 },
+    };
     let class: Vec<u8> = (0..n).map(|i| (i % PixelClass::COUNT) as u8).collect();
     let mut pixels = [0; PixelClass::COUNT];
     class.iter().for_each(|&c| pixels[c as usize] += 1);
@@ -77,11 +81,12 @@ pub fn frame(number: i64, kind: FrameKind, shape: &Shape) -> Frame {
         specular: three(17),
         emission: three(20),
         lights: vec![("Key light".into(), three(23)), ("Key.light".into(), three(26))],
-        mattes: [("CryptoObject", 3), ("CryptoMaterial", 2)]
-            .map(|(layer, count)| Matte {
+        mattes: [("CryptoObject", 3, 1), ("CryptoMaterial", 2, 3)]
+            .map(|(layer, count, ranks)| Matte {
                 layer,
                 names: (0..count).map(|i| format!("{layer} {i}")).collect(),
-                index: (0..n).map(|i| (i % (count + 1)) as u32).collect(),
+                ranks,
+                covers: (0..n * ranks).map(|i| cover(i % (count + 1), i % ranks + 1)).collect(),
             })
             .to_vec(),
         stats: FrameStats {

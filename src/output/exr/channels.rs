@@ -1,7 +1,7 @@
 //! Which channels a frame becomes: names, types, and where their values come from.
 
 use super::cryptomatte::MatteLayer;
-use crate::frame::Frame;
+use crate::frame::{Cover, Frame};
 use exr::meta::attribute::{ChannelDescription, SampleType, Text};
 use half::slice::HalfFloatSliceExt;
 use std::collections::HashSet;
@@ -26,12 +26,18 @@ enum Source<'a> {
     One(&'a [f32]),
     Class(&'a [u8]),
     Tag(&'a [u32]),
-    /// The id of what is numbered.
-    Id(&'a [u32], &'a [f32]),
-    /// 1 where anything is numbered.
-    Covered(&'a [u32]),
-    /// Nothing, for so many pixels.
-    Nothing(usize),
+    /// What a rank of a matte shows.
+    Id(Rank<'a>, &'a [f32]),
+    /// How much of the pixel that covers.
+    Share(Rank<'a>),
+}
+
+/// One of the things that each pixel of a matte shows.
+#[derive(Debug, Clone, Copy)]
+struct Rank<'a> {
+    covers: &'a [Cover],
+    ranks: usize,
+    rank: usize,
 }
 
 /// Largest finite half.
@@ -77,10 +83,13 @@ impl<'a> Channel<'a> {
             }
         }
         for MatteLayer { matte, ids } in mattes {
-            let (index, nothing) = (&matte.index, Source::Nothing(matte.index.len()));
-            let ranks = [Source::Id(index, ids), Source::Covered(index), nothing, nothing];
-            for (color, source) in ["R", "G", "B", "A"].into_iter().zip(ranks) {
-                add(format!("{}00.{color}", matte.layer), false, source);
+            // Layers have four channels: two ranks, of which the second may be empty.
+            for rank in 0..matte.ranks.next_multiple_of(2) {
+                let of = Rank { covers: &matte.covers, ranks: matte.ranks, rank };
+                let [id, share] = if rank % 2 == 0 { ["R", "G"] } else { ["B", "A"] };
+                let name = |color| format!("{}{:02}.{color}", matte.layer, rank / 2);
+                add(name(id), false, Source::Id(of, ids));
+                add(name(share), false, Source::Share(of));
             }
         }
         channels.sort_by(|a, b| a.name.as_bytes().cmp(b.name.as_bytes()));
@@ -106,8 +115,8 @@ impl<'a> Channel<'a> {
             Source::Two(values, _) => values.len(),
             Source::One(values) => values.len(),
             Source::Class(values) => values.len(),
-            Source::Tag(values) | Source::Id(values, _) | Source::Covered(values) => values.len(),
-            Source::Nothing(pixels) => pixels,
+            Source::Tag(values) => values.len(),
+            Source::Id(rank, _) | Source::Share(rank) => rank.pixels(),
         }
     }
 
@@ -124,12 +133,11 @@ impl<'a> Channel<'a> {
             Source::One(values) => floats.extend_from_slice(&values[pixels]),
             Source::Class(values) => floats.extend(values[pixels].iter().map(|&v| f32::from(v))),
             Source::Tag(values) => floats.extend(values[pixels].iter().map(|&v| v as f32)),
-            Source::Id(values, ids) => {
-                let id = |&v: &u32| (v as usize).checked_sub(1).and_then(|i| ids.get(i)).copied();
-                floats.extend(values[pixels].iter().map(|v| id(v).unwrap_or(0.0)));
+            Source::Id(rank, ids) => {
+                let id = |name: u32| (name as usize).checked_sub(1).and_then(|i| ids.get(i)).copied();
+                floats.extend(rank.covers(pixels).map(|cover| id(cover.name).unwrap_or(0.0)));
             }
-            Source::Covered(values) => floats.extend(values[pixels].iter().map(|&v| f32::from(v > 0))),
-            Source::Nothing(_) => floats.resize(pixels.len(), 0.0),
+            Source::Share(rank) => floats.extend(rank.covers(pixels).map(|cover| cover.share)),
         }
         let largest = if self.half { HALF_MAX } else { f32::MAX };
         // False for NaN.
@@ -149,6 +157,17 @@ impl<'a> Channel<'a> {
             append(bytes, floats, |v| v.to_le_bytes());
         }
         broken
+    }
+}
+
+impl Rank<'_> {
+    fn pixels(self) -> usize {
+        self.covers.len() / self.ranks
+    }
+
+    fn covers(self, pixels: Range<usize>) -> impl Iterator<Item = Cover> {
+        let covers = &self.covers[pixels.start * self.ranks..pixels.end * self.ranks];
+        covers.chunks_exact(self.ranks).map(move |pixel| pixel.get(self.rank).copied().unwrap_or_default())
     }
 }
 

@@ -2,8 +2,8 @@
 //!
 //! Source: J. Friedman, A. Jones, *Fully automatic ID mattes with support for motion blur and transparency*, SIGGRAPH 2015, and
 //! version 1.2 of its specification. A pixel names what it shows by a hash of the name, kept as a float; the header lists all
-//! names. There is one sample a pixel, hence one rank: an id and a coverage of 1, and an empty second rank, because layers
-//! have four channels.
+//! names. Without super-sampling there is one sample a pixel, hence one rank: an id and a coverage of 1, and an empty second rank,
+//! because layers have four channels. With it there are six, in three layers.
 
 use crate::frame::{Frame, Matte};
 use serde_json::{Map, Value};
@@ -120,7 +120,7 @@ mod tests {
     #[test]
     fn the_header_lists_every_name() {
         let names = ["cube", "a \"quoted\" näme"].map(String::from).into();
-        let matte = Matte { layer: "CryptoObject", names, index: Vec::new() };
+        let matte = Matte { layer: "CryptoObject", names, ranks: 1, covers: Vec::new() };
         let layer = MatteLayer { ids: matte.names.iter().map(|n| id(n)).collect(), matte: &matte };
         let attributes = layer.attributes();
         assert_eq!(attributes[0].1, "CryptoObject");
