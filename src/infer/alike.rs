@@ -4,9 +4,8 @@
 //! pixels at once: down their columns, and then along the row. What nothing landed on says nothing.
 
 use super::around::Trust;
-use super::buzz_buffer::BuzzBuffer;
-use super::centre::{CastCentres, ENOUGH_TO_FILL};
-use super::sources::{MOVED, NAMES, NOTHING, SUSPECT, Sources};
+use super::centre::{Basis, CastCentres, ENOUGH_TO_FILL};
+use super::sources::{MOVED, NAMES, NOTHING, SUSPECT};
 use crate::frame::{FourPoints, SurfaceSample};
 use std::ops::Range;
 
@@ -37,10 +36,7 @@ pub(super) struct Alike {
 /// Finds the pixels of a row of which all that landed on them and around is one triangle, lit alike everywhere, and before
 /// which nothing unknown may stand.
 pub(super) struct AlikeRow<'a, R> {
-    old: &'a BuzzBuffer,
-    sources: &'a Sources,
-    rays: &'a R,
-    trust: Trust,
+    basis: Basis<'a, R>,
     y: usize,
     /// Of the stretch and the four that the last pixel is of.
     stretch: [Option<Found>; STRETCH],
@@ -57,9 +53,9 @@ struct Found {
 }
 
 impl<'a, R: CastCentres> AlikeRow<'a, R> {
-    /// Row `y` of the image that `sources` make of `old`.
-    pub fn new(old: &'a BuzzBuffer, sources: &'a Sources, rays: &'a R, trust: Trust, y: usize) -> Self {
-        Self { old, sources, rays, trust, y, stretch: [None; STRETCH], four: None }
+    /// Row `y` of the image that a step makes.
+    pub fn new(basis: Basis<'a, R>, y: usize) -> Self {
+        Self { basis, y, stretch: [None; STRETCH], four: None }
     }
 
     /// Column `x`. They are asked for in order.
@@ -75,10 +71,10 @@ impl<'a, R: CastCentres> AlikeRow<'a, R> {
         }
         let Found { source, moved, same } = self.stretch[at]?;
         let source = source as usize;
-        let sample = self.old.sample(source);
+        let sample = self.basis.old.sample(source);
         let centre = match &self.four {
             Some(four) => four.of(at % FOUR, &sample),
-            None if moved => self.rays.nearest_of(x, self.y, std::iter::once(sample), memory),
+            None if moved => self.basis.rays.nearest_of(x, self.y, std::iter::once(sample), memory),
             None => Some(sample),
         };
         Some(Alike { source, centre, same: same || !moved })
@@ -89,9 +85,10 @@ impl<'a, R: CastCentres> AlikeRow<'a, R> {
         let at = x % STRETCH;
         let [Some(a), Some(b), Some(c), Some(d)] = self.stretch[at..at + FOUR] else { return None };
         let first = a.source as usize;
-        let is_one = |other: Found| other.moved && self.old.is_same_primitive(first, other.source as usize);
+        let is_one =
+            |other: Found| other.moved && self.basis.old.is_same_primitive(first, other.source as usize);
         let is_one = a.moved && is_one(b) && is_one(c) && is_one(d);
-        is_one.then(|| self.rays.four_on((x, self.y), self.old.surface[first], memory))?
+        is_one.then(|| self.basis.rays.four_on((x, self.y), self.basis.old.surface[first], memory))?
     }
 
     /// Looks at the stretch from column `first` on.
@@ -105,10 +102,10 @@ impl<'a, R: CastCentres> AlikeRow<'a, R> {
 
     fn found(&self, said: &Stretch, first: usize, at: usize) -> Option<Found> {
         let x = first + at;
-        if x >= self.old.width() || said.names[at] != 0 || said.flags[at] & SUSPECT != 0 {
+        if x >= self.basis.old.width() || said.names[at] != 0 || said.flags[at] & SUSPECT != 0 {
             return None;
         }
-        let own = self.sources.of(self.y * self.old.width() + x).map(|i| i as u32);
+        let own = self.basis.sources.of(self.y * self.basis.old.width() + x).map(|i| i as u32);
         let same = said.lit[at] == 0;
         if said.missing[at] == 0 {
             let moved = said.flags[at] & MOVED != 0;
@@ -119,7 +116,7 @@ impl<'a, R: CastCentres> AlikeRow<'a, R> {
             });
         }
         // Shares are interpolated where anything is missing.
-        let may_fill = self.trust == Trust::Neighbours && !self.rays.has_shares();
+        let may_fill = self.basis.trust == Trust::Neighbours && !self.basis.rays.has_shares();
         if !may_fill || said.wide_lit[at] != 0 {
             return None;
         }
@@ -128,10 +125,10 @@ impl<'a, R: CastCentres> AlikeRow<'a, R> {
 
     /// The first sample around a pixel on which none landed, if there are enough of them.
     fn first_around(&self, x: usize, y: usize) -> Option<u32> {
-        let (width, height) = (self.old.width(), self.old.height());
+        let (width, height) = (self.basis.old.width(), self.basis.old.height());
         let columns = x.saturating_sub(1)..(x + 2).min(width);
         let rows = y.saturating_sub(1)..(y + 2).min(height);
-        let landed = rows.flat_map(|y| self.sources.row(width, y, columns.clone()));
+        let landed = rows.flat_map(|y| self.basis.sources.row(width, y, columns.clone()));
         let known = || landed.clone().map(|source| source & NOTHING).filter(|&i| i != NOTHING);
         known().next().filter(|_| known().count() >= ENOUGH_TO_FILL)
     }
@@ -140,13 +137,13 @@ impl<'a, R: CastCentres> AlikeRow<'a, R> {
     /// shares that differ by their noise. Something landed on all of them.
     fn agree(&self, (x, y): (usize, usize)) -> bool {
         let lit = |x: usize, y: usize| {
-            let source = self.sources.of(y * self.old.width() + x);
-            source.map_or(&[][..], |i| self.old.lit(i))
+            let source = self.basis.sources.of(y * self.basis.old.width() + x);
+            source.map_or(&[][..], |i| self.basis.old.lit(i))
         };
         let is_column =
-            |x: usize| [y - 1, y + 1].into_iter().all(|y2| self.rays.agree(lit(x, y), lit(x, y2)));
-        let is_row = || [x - 1, x + 1].into_iter().all(|x2| self.rays.agree(lit(x, y), lit(x2, y)));
-        self.rays.has_shares() && (x - 1..=x + 1).all(is_column) && is_row()
+            |x: usize| [y - 1, y + 1].into_iter().all(|y2| self.basis.rays.agree(lit(x, y), lit(x, y2)));
+        let is_row = || [x - 1, x + 1].into_iter().all(|x2| self.basis.rays.agree(lit(x, y), lit(x2, y)));
+        self.basis.rays.has_shares() && (x - 1..=x + 1).all(is_column) && is_row()
     }
 }
 
@@ -166,12 +163,13 @@ struct Stretch {
 
 impl Stretch {
     fn new<R>(of: &AlikeRow<'_, R>, first: usize) -> Self {
-        let (width, height, y) = (of.old.width(), of.old.height(), of.y);
+        let (width, height, y) = (of.basis.old.width(), of.basis.old.height(), of.y);
         let columns = first.saturating_sub(REACH)..(first + STRETCH + REACH).min(width);
         // Where `columns` begin: outside the image nothing landed.
         let at = columns.start + REACH - first;
         let row = |k: usize| (y + k).checked_sub(REACH).filter(|&row| row < height);
-        let landed = |k: usize| row(k).map_or(&[][..], |row| of.sources.row(width, row, columns.clone()));
+        let landed =
+            |k: usize| row(k).map_or(&[][..], |row| of.basis.sources.row(width, row, columns.clone()));
         let unknown: [_; ROWS] = std::array::from_fn(|k| {
             let mut unknown = [u32::MAX; COLUMNS];
             let is_nothing = |source: u32| if source & NOTHING == NOTHING { u32::MAX } else { 0 };
@@ -192,11 +190,11 @@ impl Stretch {
         }
         flags.any::<1>(&mut this.flags);
         missing.any::<1>(&mut this.missing);
-        for number in 0..NAMES + of.old.lit_words() {
+        for number in 0..NAMES + of.basis.old.lit_words() {
             let mut common = Common::NONE;
             let include = |common: &mut Common, k: usize| {
                 if let Some(row) = row(k) {
-                    let words = of.sources.words(number, width, row, columns.clone());
+                    let words = of.basis.sources.words(number, width, row, columns.clone());
                     common.include(at, words, &unknown[k]);
                 }
             };

@@ -177,21 +177,31 @@ impl BuzzBuffer {
     /// So many rows at a time, one after the other, for writing in parallel; the last may have fewer.
     pub(super) fn bands_mut(&mut self, rows: usize) -> impl IndexedParallelIterator<Item = Row<'_>> {
         let (w, lit_words) = (rows * self.width, self.lit_words);
-        // A scene without lights has no shadow words, but a chunk's length may not be zero.
-        self.lit.resize((self.width * self.height * lit_words).max(self.height), 0);
-        let lit_row = (w * lit_words).max(rows);
         (
             self.z.par_chunks_mut(w),
             self.position.par_chunks_mut(w),
             self.object.par_chunks_mut(w),
             self.surface.par_chunks_mut(w),
             self.normal.par_chunks_mut(w),
-            self.lit.par_chunks_mut(lit_row),
+            words_by_rows(&mut self.lit, self.width * lit_words, self.height, rows),
             self.class.par_chunks_mut(w),
         )
             .into_par_iter()
             .map(move |columns| Row::of(columns, lit_words))
     }
+}
+
+/// Shadow bits, `per_row` words of them, of so many rows at a time. A scene without lights has none, but a chunk's length may not be
+/// zero: then there is a word for each row, which nobody reads.
+pub(super) fn words_by_rows(
+    words: &mut Vec<u32>,
+    per_row: usize,
+    height: usize,
+    rows: usize,
+) -> impl IndexedParallelIterator<Item = &mut [u32]> {
+    let per_row = per_row.max(1);
+    words.resize(per_row * height, 0);
+    words.par_chunks_mut(per_row * rows)
 }
 
 /// The pixels around one that are inside the image, at most eight.

@@ -5,12 +5,12 @@ use super::around::{Around, Lent, Tangent, Trust, is_one_surface};
 use super::between::{self, Changed, Steps};
 use super::buzz_buffer::{BuzzBuffer, Row, UNKNOWN, pixels_around};
 use super::cell::growth;
-use super::centre::CastCentres;
+use super::centre::{Basis, CastCentres};
 use super::entering::KnownArea;
 use super::moved::Askers;
 use super::projector::Projector;
+use super::questions::{LightQuestions, Questions};
 use super::shares::{carry, spare};
-use super::sources::Sources;
 use super::tiles::Tiles;
 use crate::frame::{PixelClass, RayCounts, SurfaceSample};
 use rayon::prelude::*;
@@ -75,60 +75,53 @@ impl Grid {
 
 /// What casting the rays of a frame goes by.
 pub(super) struct Pass<'a, R> {
-    pub old: &'a BuzzBuffer,
-    pub sources: &'a Sources,
+    pub basis: Basis<'a, R>,
     proven: &'a Tiles,
-    pub view: &'a Projector,
     /// Whether the camera moves.
     moves: bool,
     /// Where nothing can have come in before what has stayed; none where that is everywhere.
     known: Option<KnownArea<'a>>,
     grid: Grid,
-    pub rays: &'a R,
-    trust: Trust,
     askers: Option<Askers<'a>>,
 }
 
-/// For the pixels of an image, of a row, or for one: bits of the lights to ask, and of those in doubt.
-type Bits<'a> = (&'a mut [u32], &'a mut [u32]);
-
 impl<'a, R: CastCentres> Pass<'a, R> {
     pub fn new(
-        (old, sources, proven): (&'a BuzzBuffer, &'a Sources, &'a Tiles),
-        (view, moves, known): (&'a Projector, bool, Option<KnownArea<'a>>),
-        (rays, askers): (&'a R, Option<Askers<'a>>),
-        trust: Trust,
+        basis: Basis<'a, R>,
+        proven: &'a Tiles,
+        (moves, known): (bool, Option<KnownArea<'a>>),
+        askers: Option<Askers<'a>>,
     ) -> Self {
-        Self { old, sources, proven, view, moves, known, grid: Grid::of(view), rays, trust, askers }
+        Self { basis, proven, moves, known, grid: Grid::of(basis.view), askers }
     }
 
     /// Casts what is wanted at all pixels.
-    pub fn cast(&self, new: &mut BuzzBuffer, bits: Bits<'_>) -> RayCounts {
-        self.by_rows(new, bits, |y, (row, above), bits, counts| {
+    pub fn cast(&self, new: &mut BuzzBuffer, questions: &mut LightQuestions) -> RayCounts {
+        self.by_rows(new, questions, |y, (row, above), questions, counts| {
             let (steps, mut memory) = (Steps::of(y), R::Memory::default());
             let mut changed = self.changed();
-            let known = self.known.map_or(0..self.old.width(), |known| known.columns(y));
+            let known = self.known.map_or(0..self.basis.old.width(), |known| known.columns(y));
             steps.columns(row.object.len(), |x| {
                 if row.object[x] != UNKNOWN && self.wants_proof((x, y), row, &known) {
                     self.forget_if_hidden(x, row, counts);
                 }
                 if row.object[x] == UNKNOWN {
                     let found = self.fill((x, y), row, steps, &mut memory);
-                    self.see((x, y), (row, above), found, self.of_pixel(bits, x), counts);
-                } else if self.trust == Trust::Neighbours && self.looks_out((x, y), row) {
+                    self.see((x, y), (row, above), found, questions.at(x), counts);
+                } else if self.basis.trust == Trust::Neighbours && self.looks_out((x, y), row) {
                     // Light and shadows that were too small to be met grow as surfaces do.
-                    self.rays.confirm(self.of_pixel(bits, x).0);
+                    self.basis.rays.confirm(questions.at(x).ask);
                 }
-                self.ask((x, y), row, self.of_pixel(bits, x), &mut changed, counts);
+                self.ask((x, y), row, questions.at(x), &mut changed, counts);
             });
         })
     }
 
     /// Proves the samples of `pixels`, which are in order, visible, and casts those that are hidden, or were only filled in between
     /// others.
-    pub fn prove(&self, new: &mut BuzzBuffer, pixels: &[u32], bits: Bits<'_>) -> RayCounts {
-        let width = self.old.width();
-        self.by_rows(new, bits, |y, (row, above), bits, counts| {
+    pub fn prove(&self, new: &mut BuzzBuffer, pixels: &[u32], questions: &mut LightQuestions) -> RayCounts {
+        let width = self.basis.old.width();
+        self.by_rows(new, questions, |y, (row, above), questions, counts| {
             let mut changed = self.changed();
             let first = pixels.partition_point(|&pixel| (pixel as usize) < y * width);
             let columns = pixels[first..].iter().map(|&pixel| pixel as usize - y * width);
@@ -140,8 +133,8 @@ impl<'a, R: CastCentres> Pass<'a, R> {
                     self.forget_if_hidden(x, row, counts);
                 }
                 if row.object[x] == UNKNOWN {
-                    self.see((x, y), (row, above), None, self.of_pixel(bits, x), counts);
-                    self.ask((x, y), row, self.of_pixel(bits, x), &mut changed, counts);
+                    self.see((x, y), (row, above), None, questions.at(x), counts);
+                    self.ask((x, y), row, questions.at(x), &mut changed, counts);
                 }
             }
         })
@@ -151,55 +144,50 @@ impl<'a, R: CastCentres> Pass<'a, R> {
     fn by_rows(
         &self,
         new: &mut BuzzBuffer,
-        (ask, doubt): Bits<'_>,
-        cast_row: impl Fn(usize, (&mut Row<'_>, Option<&Row<'_>>), &mut Bits<'_>, &mut RayCounts) + Sync,
+        questions: &mut LightQuestions,
+        cast_row: impl Fn(usize, (&mut Row<'_>, Option<&Row<'_>>), &mut Questions<'_>, &mut RayCounts) + Sync,
     ) -> RayCounts {
-        let (width, words) = (self.old.width(), self.old.width() * self.old.lit_words());
-        // Without lights there are no words, but a chunk's length may not be zero.
-        let bits = |bits| <[u32]>::par_chunks_mut(bits, (2 * words).max(2));
-        let pairs = new.bands_mut(2).zip(bits(ask)).zip(bits(doubt));
-        let cast_pair = |(number, ((rows, ask), doubt)): (usize, ((Row<'_>, _), _))| {
+        let width = self.basis.old.width();
+        let pairs = new.bands_mut(2).zip(questions.bands_mut(2));
+        let cast_pair = |(number, (rows, questions)): (usize, (Row<'_>, Questions<'_>))| {
             let mut counts = RayCounts::default();
-            if self.rays.is_cancelled() {
+            if self.basis.rays.is_cancelled() {
                 return counts;
             }
             let [mut first, mut second] = rows.split_at(width);
-            let [ask, doubt] = [ask, doubt].map(|bits| <[u32]>::split_at_mut(bits, words));
-            cast_row(2 * number, (&mut first, None), &mut (ask.0, doubt.0), &mut counts);
+            let [mut asked_first, mut asked_second] = questions.split_at(width);
+            cast_row(2 * number, (&mut first, None), &mut asked_first, &mut counts);
             // An odd number of rows leaves one alone.
             if !second.object.is_empty() {
                 let above = Some(&first);
-                cast_row(2 * number + 1, (&mut second, above), &mut (ask.1, doubt.1), &mut counts);
+                cast_row(2 * number + 1, (&mut second, above), &mut asked_second, &mut counts);
             }
             counts
         };
         pairs.enumerate().map(cast_pair).sum()
     }
 
-    /// The bits of column `x` of a row's.
-    fn of_pixel<'b>(&self, (ask, doubt): &'b mut Bits<'_>, x: usize) -> Bits<'b> {
-        let words = self.old.lit_words();
-        let columns = x * words..(x + 1) * words;
-        (&mut ask[columns.clone()], &mut doubt[columns])
-    }
-
     /// True where nothing around is believed, as something may have grown there that was too small to be met.
     fn looks_out(&self, (x, y): (usize, usize), row: &Row<'_>) -> bool {
-        let has_grown =
-            |i: usize| FAST * growth(self.old, self.view, i, row.z[x]) < 1.0 || self.old.z[i].is_infinite();
-        let grows = || self.sources.of(y * self.old.width() + x).is_none_or(has_grown);
+        let has_grown = |i: usize| {
+            FAST * growth(self.basis.old, self.basis.view, i, row.z[x]) < 1.0
+                || self.basis.old.z[i].is_infinite()
+        };
+        let grows = || self.basis.sources.of(y * self.basis.old.width() + x).is_none_or(has_grown);
         let has = |step: usize| self.grid.has((x, y), step);
         self.moves && has(NEAR_LOOKOUT) && (has(LOOKOUT) || grows())
     }
 
     /// True where what is reused is proven visible whatever is known around it; `known` are the columns in which nothing has come in.
     fn wants_proof(&self, (x, y): (usize, usize), row: &Row<'_>, known: &Range<usize>) -> bool {
-        let is_at_side = || x == 0 || y == 0 || x + 1 == self.old.width() || y + 1 == self.old.height();
+        let is_at_side =
+            || x == 0 || y == 0 || x + 1 == self.basis.old.width() || y + 1 == self.basis.old.height();
         let comes_in = || self.moves && is_at_side() && self.grid.has_side((x, y));
-        let is_new =
-            || self.grid.has_new((x, y)) && (!known.contains(&x) || self.was_new(y * self.old.width() + x));
+        let is_new = || {
+            self.grid.has_new((x, y)) && (!known.contains(&x) || self.was_new(y * self.basis.old.width() + x))
+        };
         let is_body = || self.askers.as_ref().is_some_and(|askers| askers.is_on_body(&row.sample(x)));
-        match self.trust {
+        match self.basis.trust {
             Trust::Proof => !self.proven.has((x, y)),
             Trust::Neighbours => {
                 self.looks_out((x, y), row)
@@ -212,15 +200,15 @@ impl<'a, R: CastCentres> Pass<'a, R> {
 
     /// True if nothing landed on a pixel, nor on any around it.
     pub fn is_new(&self, pixel: usize) -> bool {
-        let width = self.old.width();
-        self.sources.is_nothing_around(width, (pixel % width, pixel / width))
+        let width = self.basis.old.width();
+        self.basis.sources.is_nothing_around(width, (pixel % width, pixel / width))
     }
 
     /// True if what has landed on a pixel was new in the old view, and no ray was cast for it.
     fn was_new(&self, pixel: usize) -> bool {
-        let (width, height, class) = (self.old.width(), self.old.height(), &self.old.class);
+        let (width, height, class) = (self.basis.old.width(), self.basis.old.height(), &self.basis.old.class);
         let is_new = |&i: &usize| class[i] == PixelClass::Filled || !class[i].is_reused();
-        self.sources.of(pixel).is_some_and(|i| {
+        self.basis.sources.of(pixel).is_some_and(|i| {
             class[i] == PixelClass::Filled && pixels_around(width, height, i).all(|around| is_new(&around))
         })
     }
@@ -233,16 +221,17 @@ impl<'a, R: CastCentres> Pass<'a, R> {
         steps: Steps,
         memory: &mut R::Memory,
     ) -> Option<SurfaceSample> {
-        let is_new = self.trust == Trust::Neighbours && self.is_new(y * row.object.len() + x);
-        let found =
-            is_new.then(|| between::fill(row, (x, y), steps, self.view, self.rays, memory)).flatten()?;
+        let is_new = self.basis.trust == Trust::Neighbours && self.is_new(y * row.object.len() + x);
+        let found = is_new
+            .then(|| between::fill(row, (x, y), steps, self.basis.view, self.basis.rays, memory))
+            .flatten()?;
         row.class[x] = PixelClass::Filled;
         Some(found)
     }
 
     /// Makes the sample of column `x` unknown if something hides it.
     fn forget_if_hidden(&self, x: usize, row: &mut Row<'_>, counts: &mut RayCounts) {
-        if self.rays.is_hidden(&row.sample(x), counts) {
+        if self.basis.rays.is_hidden(&row.sample(x), counts) {
             row.class[x] = PixelClass::Bad;
             row.object[x] = UNKNOWN;
         }
@@ -254,25 +243,25 @@ impl<'a, R: CastCentres> Pass<'a, R> {
         (x, y): (usize, usize),
         (row, above): (&mut Row<'_>, Option<&Row<'_>>),
         found: Option<SurfaceSample>,
-        (ask, doubt): Bits<'_>,
+        Questions { ask, doubt, .. }: Questions<'_>,
         counts: &mut RayCounts,
     ) {
-        let (old, view, rays) = (self.old, self.view, self.rays);
+        let Basis { old, sources, view, rays, trust } = self.basis;
         let sample = found.unwrap_or_else(|| rays.hit(x, y, counts));
         row.put(x, view, &sample);
         row.lit_mut(x).fill(0);
         ask.fill(u32::MAX);
-        let own = self.sources.of(y * old.width() + x);
+        let own = sources.of(y * old.width() + x);
         let certain = own.filter(|&i| is_one_surface(&sample, &old.sample(i), view));
         // What comes in here may be a shadow, and half of what is around is outside of the image.
         let enters = row.class[x] == PixelClass::Entering;
         let mut lent = Lent::Nothing;
         if found.is_none()
             && !enters
-            && (certain.is_some() || rays.has_shares() || self.trust == Trust::Neighbours)
+            && (certain.is_some() || rays.has_shares() || trust == Trust::Neighbours)
         {
-            let around = Around::new(old, view, self.sources, (x, y), 2);
-            lent = around.lend(&sample, rays, (self.trust, certain.is_some()), row.lit_mut(x), ask);
+            let around = Around::new(old, view, sources, (x, y), 2);
+            lent = around.lend(&sample, rays, (trust, certain.is_some()), row.lit_mut(x), ask);
             if let Some(i) = certain
                 && rays.has_shares()
             {
@@ -281,25 +270,25 @@ impl<'a, R: CastCentres> Pass<'a, R> {
         }
         // What only lies around a pixel on which nothing landed is asked anew, but for shares, which a few rays confirm.
         let is_poor = if rays.has_shares() { lent == Lent::Nothing } else { lent != Lent::Cell };
-        if !enters && certain.is_none() && is_poor && self.trust == Trust::Neighbours {
+        if !enters && certain.is_none() && is_poor && trust == Trust::Neighbours {
             between::lend((row, above), x, Steps::of(y), view, &sample, rays, ask);
         } else if lent != Lent::Nothing {
-            spare((x, y), self.trust, rays, ask);
+            spare((x, y), trust, rays, ask);
         }
         doubt.fill(if lent == Lent::Cell { 0 } else { u32::MAX });
     }
 
     /// The shadow bits that landed above and below a pixel, where they lie on its surface.
     fn known_above_and_below(&self, (x, y): (usize, usize), tangent: &Tangent<'_>) -> [Option<&'a [u32]>; 2] {
-        let landed = |y: usize| self.sources.of(y * self.old.width() + x);
-        let lends = |&i: &usize| tangent.may_lend(&self.old.sample(i));
-        [y.checked_sub(1), Some(y + 1).filter(|&y| y < self.old.height())]
-            .map(|y| y.and_then(landed).filter(lends).map(|i| self.old.lit(i)))
+        let landed = |y: usize| self.basis.sources.of(y * self.basis.old.width() + x);
+        let lends = |&i: &usize| tangent.may_lend(&self.basis.old.sample(i));
+        [y.checked_sub(1), Some(y + 1).filter(|&y| y < self.basis.old.height())]
+            .map(|y| y.and_then(landed).filter(lends).map(|i| self.basis.old.lit(i)))
     }
 
     /// Room for the lights that may have changed, where any may.
     fn changed(&self) -> Changed {
-        if self.askers.is_some() { Changed::new(self.old.lit_words()) } else { Changed::default() }
+        if self.askers.is_some() { Changed::new(self.basis.old.lit_words()) } else { Changed::default() }
     }
 
     /// Asks the lights that have to be asked.
@@ -307,16 +296,17 @@ impl<'a, R: CastCentres> Pass<'a, R> {
         &self,
         (x, y): (usize, usize),
         row: &mut Row<'_>,
-        (ask, doubt): (&mut [u32], &mut [u32]),
+        Questions { ask, doubt, .. }: Questions<'_>,
         changed: &mut Changed,
         counts: &mut RayCounts,
     ) {
-        let rays = self.rays;
+        let rays = self.basis.rays;
         if self.moves && rays.has_shares() && self.grid.has((x, y), RENEWED) {
             rays.confirm(ask);
         }
         // Its lights were asked when it was cast in an earlier frame, or since.
-        let is_kept = row.class[x].is_reused() && self.sources.is_centred(y * self.old.width() + x);
+        let is_kept =
+            row.class[x].is_reused() && self.basis.sources.is_centred(y * self.basis.old.width() + x);
         let mut settled = is_kept && ask.iter().all(|&bits| bits == 0);
         let believed = doubt.iter().all(|&bits| bits == 0);
         let pixel = y * row.object.len() + x;
@@ -324,9 +314,9 @@ impl<'a, R: CastCentres> Pass<'a, R> {
             && !askers.are_quiet(pixel, &row.sample(x))
         {
             changed.bits.copy_from_slice(ask);
-            if self.trust == Trust::Neighbours {
+            if self.basis.trust == Trust::Neighbours {
                 let known = |tangent: &Tangent<'_>| self.known_above_and_below((x, y), tangent);
-                changed.compare(row, x, (Steps::of(y), self.view), rays, known);
+                changed.compare(row, x, (Steps::of(y), self.basis.view), rays, known);
             }
             askers.ask(pixel, &row.sample(x), (row.lit(x), &changed.agreed), &mut changed.bits);
             changed.bits.iter_mut().zip(&*ask).for_each(|(bits, asked)| *bits &= !asked);

@@ -30,6 +30,7 @@ use super::moved::Askers;
 use super::outlines::Outlines;
 use super::project::Landings;
 use super::projector::Projector;
+use super::questions::{LightQuestions, Questions};
 use super::shadow_edges::ShadowEdges;
 use super::shafts::Shafts;
 use super::shares::{carry, spare};
@@ -143,10 +144,7 @@ pub(super) const ENOUGH_TO_FILL: usize = 3;
 #[derive(Debug, Default)]
 pub struct Centring {
     sources: Sources,
-    /// For each pixel: bits of the lights that have to be asked.
-    ask: Vec<u32>,
-    /// For each pixel: bits of the lights of which it is in doubt whether what was carried here is right around it.
-    doubt: Vec<u32>,
+    questions: LightQuestions,
     tiles: Tiles,
     frontier: Frontier,
     outlines: Outlines,
@@ -158,7 +156,7 @@ impl Centring {
     /// those in doubt, which tiles are proven, and what following outlines and shadows' edges takes.
     pub fn bytes_per_pixel(words: usize) -> usize {
         Sources::bytes_per_pixel(words)
-            + 2 * words * size_of::<u32>()
+            + LightQuestions::bytes_per_pixel(words)
             + Tiles::BYTES_PER_PIXEL
             + Frontier::BYTES_PER_PIXEL
             + Outlines::BYTES_PER_PIXEL
@@ -177,23 +175,18 @@ impl Centring {
     ) {
         self.sources.settle(old, landings, marks);
         new.side = view.side();
-        let (width, words) = (old.width(), old.lit_words());
-        // Without lights there are no words, but a chunk's length may not be zero.
-        for bits in [&mut self.ask, &mut self.doubt] {
-            bits.resize((old.object.len() * words).max(old.height()), 0);
-        }
-        let bits = |bits| <[u32]>::par_chunks_mut(bits, (width * words).max(1));
-        let rows = new.rows_mut().zip(bits(&mut self.ask)).zip(bits(&mut self.doubt));
-        let recentring = Recentring { old, sources: &self.sources, view, rays, trust };
-        rows.enumerate().for_each(|(y, ((mut row, ask), doubt))| {
-            ask.fill(0);
-            doubt.fill(if rays.has_shares() { u32::MAX } else { 0 });
+        self.questions.fit(old);
+        let basis = Basis { old, sources: &self.sources, view, rays, trust };
+        let rows = new.rows_mut().zip(self.questions.bands_mut(1));
+        rows.enumerate().for_each(|(y, (mut row, mut questions))| {
+            questions.ask.fill(0);
+            questions.doubt.fill(if rays.has_shares() { u32::MAX } else { 0 });
             let mut memory = R::Memory::default();
-            let mut alike = AlikeRow::new(old, recentring.sources, rays, trust, y);
-            for x in 0..width {
-                let pixel = y * width + x;
-                let [ask, doubt] = [&mut *ask, &mut *doubt].map(|bits| &mut bits[x * words..][..words]);
-                let own = recentring.sources.of(pixel);
+            let mut alike = AlikeRow::new(basis, y);
+            for x in 0..row.object.len() {
+                let pixel = y * row.object.len() + x;
+                let questions = questions.at(x);
+                let own = basis.sources.of(pixel);
                 row.object[x] = UNKNOWN;
                 row.class[x] = match (own, marks.get(pixel)) {
                     (None, Some(PixelClass::Entering)) => PixelClass::Entering,
@@ -202,11 +195,11 @@ impl Centring {
                 };
                 // Within a triangle that is lit alike all around there is no more to find out.
                 let centred = if let Some(alike) = alike.at(x, &mut memory) {
-                    recentring.take((x, y), alike, &mut row, ask)
-                } else if recentring.sources.is_suspect(pixel) {
+                    basis.take((x, y), alike, &mut row, questions.ask)
+                } else if basis.sources.is_suspect(pixel) {
                     continue;
                 } else {
-                    recentring.centre((x, y), &mut row, (ask, doubt), &mut memory)
+                    basis.centre((x, y), &mut row, questions, &mut memory)
                 };
                 row.class[x] = match (own, centred) {
                     (None, Some(())) => PixelClass::Filled,
@@ -233,29 +226,38 @@ impl Centring {
             let at = |x: usize, y: usize| new.sample(y * new.width() + x);
             self.tiles.look(new, |pixels| rays.sees_all(pixels, at));
         }
-        let said = (old, &self.sources, &self.tiles);
-        let pass = Pass::new(said, (view, moves, known), (rays, askers), trust);
-        let mut counts = pass.cast(new, (&mut self.ask, &mut self.doubt));
-        let frontier = &mut self.frontier;
+        let basis = Basis { old, sources: &self.sources, view, rays, trust };
+        let pass = Pass::new(basis, &self.tiles, (moves, known), askers);
+        let (frontier, questions) = (&mut self.frontier, &mut self.questions);
+        let mut counts = pass.cast(new, questions);
         // Where everything is proven nothing new is met beside it.
         if trust == Trust::Neighbours {
-            counts += self.outlines.follow(frontier, &pass, new, (&mut self.ask, &mut self.doubt));
+            counts += self.outlines.follow(frontier, &pass, new, questions);
         }
-        counts += self.shadow_edges.follow(frontier, new, view, (&mut self.ask, &mut self.doubt), rays);
+        counts += self.shadow_edges.follow(frontier, new, view, questions, rays);
         counts
     }
 }
 
-/// What re-centring a frame goes by.
-struct Recentring<'a, R> {
-    old: &'a BuzzBuffer,
-    sources: &'a Sources,
-    view: &'a Projector,
-    rays: &'a R,
-    trust: Trust,
+/// What inferring a frame from another goes by.
+pub(super) struct Basis<'a, R> {
+    pub old: &'a BuzzBuffer,
+    /// What of it has landed where.
+    pub sources: &'a Sources,
+    pub view: &'a Projector,
+    pub rays: &'a R,
+    pub trust: Trust,
 }
 
-impl<R: CastCentres> Recentring<'_, R> {
+impl<R> Clone for Basis<'_, R> {
+    fn clone(&self) -> Self {
+        *self
+    }
+}
+
+impl<R> Copy for Basis<'_, R> {}
+
+impl<R: CastCentres> Basis<'_, R> {
     /// Stores what is at the centre of a pixel around which all is alike, if anything is.
     #[inline]
     fn take(&self, pixel: (usize, usize), alike: Alike, row: &mut Row<'_>, ask: &mut [u32]) -> Option<()> {
@@ -274,7 +276,7 @@ impl<R: CastCentres> Recentring<'_, R> {
         &self,
         (x, y): (usize, usize),
         row: &mut Row<'_>,
-        (ask, doubt): (&mut [u32], &mut [u32]),
+        questions: Questions<'_>,
         memory: &mut R::Memory,
     ) -> Option<()> {
         let pixel = y * self.old.width() + x;
@@ -294,7 +296,7 @@ impl<R: CastCentres> Recentring<'_, R> {
         self.reuse(x, i, &sample, row);
         // Where it is the very sample that landed here, its lights are known.
         if !self.sources.is_centred(pixel) && !around.is_lit_alike() {
-            self.light((x, y), (i, &sample), around, row, (ask, doubt));
+            self.light((x, y), (i, &sample), around, row, questions);
         }
         Some(())
     }
@@ -307,7 +309,7 @@ impl<R: CastCentres> Recentring<'_, R> {
         (i, sample): (usize, &SurfaceSample),
         around: Around<'_>,
         row: &mut Row<'_>,
-        (ask, doubt): (&mut [u32], &mut [u32]),
+        Questions { ask, doubt, .. }: Questions<'_>,
     ) {
         let Self { old, sources, view, rays, trust } = *self;
         // On a chess board: what is wrong here is asked beside it.

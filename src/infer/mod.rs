@@ -39,6 +39,7 @@ mod obscured;
 mod outlines;
 mod project;
 mod projector;
+mod questions;
 mod seen;
 mod shadow_edges;
 mod shafts;

@@ -16,6 +16,7 @@ use super::buzz_buffer::{BuzzBuffer, pixels_around};
 use super::cast::Pass;
 use super::centre::CastCentres;
 use super::frontier::Frontier;
+use super::questions::LightQuestions;
 use crate::frame::{PixelClass, RayCounts};
 use std::ops::Range;
 
@@ -36,15 +37,15 @@ impl Outlines {
         frontier: &mut Frontier,
         pass: &Pass<'_, R>,
         buffer: &mut BuzzBuffer,
-        (ask, doubt): (&mut [u32], &mut [u32]),
+        questions: &mut LightQuestions,
     ) -> RayCounts {
         let mut counts = RayCounts::default();
         self.proven.clear();
         self.proven.resize(buffer.object.len(), false);
         let is_even = |stretch| is_all_reused(buffer, &stretch) || is_one_triangle(buffer, &stretch);
         frontier.begin(buffer, is_even, |pixel| may_be_hidden(pass, buffer, pixel));
-        while !frontier.pixels().is_empty() && !pass.rays.is_cancelled() {
-            counts += pass.prove(buffer, frontier.pixels(), (ask, doubt));
+        while !frontier.pixels().is_empty() && !pass.basis.rays.is_cancelled() {
+            counts += pass.prove(buffer, frontier.pixels(), questions);
             frontier.pixels().iter().for_each(|&pixel| self.proven[pixel as usize] = true);
             let size = (buffer.width(), buffer.height());
             let is_hidden = |pixel: usize| !buffer.class[pixel].is_reused();
@@ -84,10 +85,13 @@ fn may_be_hidden<R: CastCentres>(pass: &Pass<'_, R>, buffer: &BuzzBuffer, pixel:
     let is_unknown = |met: usize| {
         let sample = buffer.sample(met);
         // What landed there is what a ray mostly meets.
-        let landed =
-            [met].into_iter().chain(around()).chain([pixel]).filter_map(|around| pass.sources.of(around));
-        let mut known = landed.map(|k| pass.old.sample(k)).chain([buffer.sample(pixel)]);
-        !known.any(|known| is_one_surface(&known, &sample, pass.view))
+        let landed = [met]
+            .into_iter()
+            .chain(around())
+            .chain([pixel])
+            .filter_map(|around| pass.basis.sources.of(around));
+        let mut known = landed.map(|k| pass.basis.old.sample(k)).chain([buffer.sample(pixel)]);
+        !known.any(|known| is_one_surface(&known, &sample, pass.basis.view))
     };
     let is_met_elsewhere =
         |met: usize| !buffer.class[met].is_reused() && !buffer.is_same_primitive(met, pixel);
@@ -95,7 +99,7 @@ fn may_be_hidden<R: CastCentres>(pass: &Pass<'_, R>, buffer: &BuzzBuffer, pixel:
         return false;
     }
     if buffer.class[pixel] == PixelClass::Filled && pass.is_new(pixel) {
-        let tangent = Tangent::new(buffer.sample(pixel), pass.view);
+        let tangent = Tangent::new(buffer.sample(pixel), pass.basis.view);
         return around().any(|met| is_met_elsewhere(met) && !tangent.is_one_thing_with(&buffer.sample(met)));
     }
     around().any(|met| is_met_elsewhere(met) && buffer.z[met] < buffer.z[pixel] && is_unknown(met))

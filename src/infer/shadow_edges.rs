@@ -11,6 +11,7 @@ use super::buzz_buffer::{BuzzBuffer, pixels_around};
 use super::centre::CastCentres;
 use super::frontier::Frontier;
 use super::projector::Projector;
+use super::questions::LightQuestions;
 use crate::frame::RayCounts;
 use rayon::prelude::*;
 use std::ops::Range;
@@ -29,15 +30,14 @@ impl ShadowEdges {
         2 * words * size_of::<u32>()
     }
 
-    /// Settles the shadow bits of `buffer`, which is complete. `asked` has the bits of the lights that each pixel has
-    /// asked already; those that it asks here are added. `doubt` has those about which what is around a pixel may be wrong;
-    /// where one changes here, all of the pixel's are added.
+    /// Settles the shadow bits of `buffer`, which is complete. `questions` name the lights that each pixel has asked already; those
+    /// that it asks here are added. Where a bit changes here, all that was carried to the pixel is in doubt.
     pub fn follow(
         &mut self,
         frontier: &mut Frontier,
         buffer: &mut BuzzBuffer,
         view: &Projector,
-        (asked, doubt): (&mut [u32], &mut [u32]),
+        questions: &mut LightQuestions,
         rays: &impl CastCentres,
     ) -> RayCounts {
         let mut counts = RayCounts::default();
@@ -50,17 +50,17 @@ impl ShadowEdges {
             bits.reserve(buffer.object.len() * words);
         }
         let wonders = |pixel: usize| {
-            let own = &asked[pixel * words..][..words];
+            let asked = &questions.ask[pixel * words..][..words];
             let asks = || {
                 let mut around = pixels_around(buffer.width(), buffer.height(), pixel);
-                around.any(|other| may_ask(buffer, (asked, doubt), (pixel, other)))
+                around.any(|other| may_ask(buffer, questions, (pixel, other)))
             };
-            own.iter().any(|&bits| bits != u32::MAX) && differs_around(buffer, pixel, rays) && asks()
+            asked.iter().any(|&bits| bits != u32::MAX) && differs_around(buffer, pixel, rays) && asks()
         };
         frontier.begin(buffer, |stretch| is_even(buffer, &stretch), wonders);
         while !frontier.pixels().is_empty() && !rays.is_cancelled() {
-            counts += self.ask(frontier.pixels(), buffer, view, (asked, doubt), rays);
-            self.apply(frontier, buffer, (asked, doubt));
+            counts += self.ask(frontier.pixels(), buffer, view, questions, rays);
+            self.apply(frontier, buffer, questions);
         }
         counts
     }
@@ -71,7 +71,7 @@ impl ShadowEdges {
         pixels: &[u32],
         buffer: &BuzzBuffer,
         view: &Projector,
-        (asked, doubt): (&[u32], &[u32]),
+        questions: &LightQuestions,
         rays: &impl CastCentres,
     ) -> RayCounts {
         let words = buffer.lit_words();
@@ -83,7 +83,7 @@ impl ShadowEdges {
             lit.copy_from_slice(buffer.lit(i));
             let sample = buffer.sample(i);
             for other in pixels_around(buffer.width(), buffer.height(), i) {
-                if may_ask(buffer, (asked, doubt), (i, other))
+                if may_ask(buffer, questions, (i, other))
                     && rays.has_edge(lit, buffer.lit(other))
                     && is_one_surface(&sample, &buffer.sample(other), view)
                 {
@@ -91,7 +91,7 @@ impl ShadowEdges {
                 }
             }
             rays.keep_edges(ask);
-            ask.iter_mut().zip(&asked[i * words..]).for_each(|(ask, asked)| *ask &= !asked);
+            ask.iter_mut().zip(&questions.ask[i * words..]).for_each(|(ask, asked)| *ask &= !asked);
             let mut counts = RayCounts::default();
             rays.recast(&sample, ask, lit, &mut counts);
             counts
@@ -101,21 +101,16 @@ impl ShadowEdges {
     }
 
     /// Takes over the answers; where they change a bit, the pixels around are looked at next.
-    fn apply(
-        &self,
-        frontier: &mut Frontier,
-        buffer: &mut BuzzBuffer,
-        (asked, doubt): (&mut [u32], &mut [u32]),
-    ) {
+    fn apply(&self, frontier: &mut Frontier, buffer: &mut BuzzBuffer, questions: &mut LightQuestions) {
         let (words, size) = (buffer.lit_words(), (buffer.width(), buffer.height()));
         let mut answers = self.ask.chunks(words).zip(self.lit.chunks(words));
         let changes = |pixel: usize| {
             answers.next().is_some_and(|(ask, lit)| {
                 let bits = pixel * words..(pixel + 1) * words;
-                asked[bits.clone()].iter_mut().zip(ask).for_each(|(asked, ask)| *asked |= ask);
+                questions.ask[bits.clone()].iter_mut().zip(ask).for_each(|(asked, ask)| *asked |= ask);
                 let changes = buffer.lit(pixel) != lit;
                 if changes {
-                    doubt[bits.clone()].fill(u32::MAX);
+                    questions.doubt[bits.clone()].fill(u32::MAX);
                     buffer.lit[bits].copy_from_slice(lit);
                 }
                 changes
@@ -141,13 +136,13 @@ fn is_even(buffer: &BuzzBuffer, stretch: &Range<usize>) -> bool {
 
 /// True if `pixel` and `other` differ in a bit about which what is around either may be wrong, and `pixel` has not asked
 /// about all in which they do.
-fn may_ask(buffer: &BuzzBuffer, (asked, doubt): (&[u32], &[u32]), (pixel, other): (usize, usize)) -> bool {
+fn may_ask(buffer: &BuzzBuffer, questions: &LightQuestions, (pixel, other): (usize, usize)) -> bool {
     let words = buffer.lit_words();
     let (mut in_doubt, mut unasked) = (0, 0);
     for (own, other) in (pixel * words..(pixel + 1) * words).zip(other * words..) {
         let differ = buffer.lit[own] ^ buffer.lit[other];
-        in_doubt |= differ & (doubt[own] | doubt[other]);
-        unasked |= differ & !asked[own];
+        in_doubt |= differ & (questions.doubt[own] | questions.doubt[other]);
+        unasked |= differ & !questions.ask[own];
     }
     in_doubt != 0 && unasked != 0
 }
