@@ -74,32 +74,28 @@ impl Accel {
     /// The nearest surface on the ray. Holes cut by alpha are not met. Where two surfaces are equally near, the one with
     /// the lower numbers is met, whatever the trees look like.
     pub fn intersect(&self, scene: &Scene, ray: &Ray, sides: Sides) -> Option<RayHit> {
-        let &Ray { origin, direction, t_min, t_max } = ray;
-        let hit = TriangleHit { t: t_max, u: 0.0, v: 0.0, front: true };
+        let hit = TriangleHit { t: ray.t_max, u: 0.0, v: 0.0, front: true };
         let mut nearest = Nearest { hit, instance: SurfaceRef::NONE, primitive: 0 };
         for shape in &self.endless {
-            self.nearest_on(scene, shape, &LocalRay { origin, direction, t_min }, 0.0, sides, &mut nearest);
+            self.nearest_on(scene, shape, &LocalRay::whole(ray), sides, &mut nearest);
         }
-        let start = self.bounds.approach(origin, direction);
-        let ray = LocalRay { origin: origin + direction * start, direction, t_min: t_min - start };
+        let ray = LocalRay::whole(ray).approaching(&self.bounds);
         self.with_pending(|pending| {
             // Scenes that stand still are one tree: there is nothing to choose from.
             if let [Placed::Tree(only)] = self.placed.as_slice() {
-                return self.nearest_in(scene, only, &ray, start, sides, &mut nearest, pending);
+                return self.nearest_in(scene, only, &ray, sides, &mut nearest, pending);
             }
             let slabs = SlabRay::new(ray.origin, ray.direction, ray.t_min);
-            self.upper.nearest(&slabs, nearest.hit.t - start, pending, |leaf, _, pending| {
+            self.upper.nearest(&slabs, nearest.hit.t - ray.start, pending, |leaf, _, pending| {
                 for placed in &self.placed[self.upper_leaves[leaf].clone()] {
                     match placed {
                         Placed::Tree(tree) => {
-                            self.nearest_in(scene, tree, &ray, start, sides, &mut nearest, pending);
+                            self.nearest_in(scene, tree, &ray, sides, &mut nearest, pending);
                         }
-                        Placed::Shape(shape) => {
-                            self.nearest_on(scene, shape, &ray, start, sides, &mut nearest)
-                        }
+                        Placed::Shape(shape) => self.nearest_on(scene, shape, &ray, sides, &mut nearest),
                     }
                 }
-                nearest.hit.t - start
+                nearest.hit.t - ray.start
             });
         });
         (nearest.instance != SurfaceRef::NONE).then_some(RayHit {
@@ -129,9 +125,7 @@ impl Accel {
         let mesh = &scene.meshes[scene.instances[index].mesh];
         if mesh.shape.is_some() {
             let shape = PlacedShape::new(scene, surface.instance, self.placement(index))?;
-            let &Ray { origin, direction, t_min, t_max } = ray;
-            let ray = LocalRay { origin, direction, t_min };
-            return shape.meet(scene, &ray, t_max, Sides::Visible);
+            return shape.meet(scene, &LocalRay::whole(ray), ray.t_max, Sides::Visible);
         }
         let known = known.learn(self, scene, mesh, surface);
         let hit = known.meet(sheared, ray.t_min, ray.t_max)?;
@@ -163,24 +157,23 @@ impl Accel {
     /// True if light passes from `from` along `direction` as far as `t_max` lengths of it: nothing there has an
     /// opacity, alpha x (1 - transmission), of one half or more. Both sides of every surface block it.
     pub fn unoccluded(&self, scene: &Scene, from: Vec3, direction: Vec3, t_max: f32) -> bool {
-        let whole = LocalRay { origin: from, direction, t_min: 0.0 };
+        let whole = LocalRay::whole(&Ray { origin: from, direction, t_min: 0.0, t_max });
         if self.endless.iter().any(|shape| shape.blocks(scene, &whole, t_max)) {
             return false;
         }
-        let start = self.bounds.approach(from, direction);
-        let ray = LocalRay { origin: from + direction * start, direction, t_min: -start };
+        let ray = whole.approaching(&self.bounds);
         !self.with_pending(|pending| {
             if let [Placed::Tree(only)] = self.placed.as_slice() {
-                return self.blocks_in(scene, only, &ray, t_max - start, pending);
+                return self.blocks_in(scene, only, &ray, t_max, pending);
             }
             let slabs = SlabRay::new(ray.origin, ray.direction, ray.t_min);
             self.upper.any(
-                |node| slabs.meet(node, t_max - start).1,
+                |node| slabs.meet(node, t_max - ray.start).1,
                 pending,
                 |leaf, pending| {
                     self.placed[self.upper_leaves[leaf].clone()].iter().any(|placed| match placed {
-                        Placed::Tree(tree) => self.blocks_in(scene, tree, &ray, t_max - start, pending),
-                        Placed::Shape(shape) => shape.blocks(scene, &ray, t_max - start),
+                        Placed::Tree(tree) => self.blocks_in(scene, tree, &ray, t_max, pending),
+                        Placed::Shape(shape) => shape.blocks(scene, &ray, t_max - ray.start),
                     })
                 },
             )
@@ -199,23 +192,21 @@ impl Accel {
         }
     }
 
-    /// Looks for something nearer in one placed group; `start` is how far along the whole ray `ray` starts.
-    #[expect(clippy::too_many_arguments, reason = "a closure's surroundings, made a function for its length")]
+    /// Looks for something nearer in one placed group.
     #[inline]
     fn nearest_in(
         &self,
         scene: &Scene,
         placed: &PlacedTree,
         ray: &LocalRay,
-        start: f32,
         sides: Sides,
         nearest: &mut Nearest,
         pending: &mut [Pending],
     ) {
         let (tree, instances) = self.lower(placed);
-        let (local, on) = placed.local(ray, &tree.bounds);
+        let local = placed.local(ray, &tree.bounds);
         let (slabs, sheared) = local.prepare();
-        let start = start + on;
+        let start = local.start;
         tree.wide.nearest(&slabs, nearest.hit.t - start, pending, |leaf, mut t_max, _| {
             let pack = &tree.leaves[leaf];
             for (lane, mut hit) in sheared.intersect(pack, local.t_min, t_max) {
@@ -243,7 +234,7 @@ impl Accel {
         });
     }
 
-    /// True if anything in one placed group blocks light before `t_max`.
+    /// True if anything in one placed group blocks light before `t_max` of the whole ray.
     #[inline]
     fn blocks_in(
         &self,
@@ -254,14 +245,15 @@ impl Accel {
         pending: &mut [Pending],
     ) -> bool {
         let (tree, instances) = self.lower(placed);
-        let (local, on) = placed.local(ray, &tree.bounds);
+        let local = placed.local(ray, &tree.bounds);
         let (slabs, sheared) = local.prepare();
+        let t_max = t_max - local.start;
         tree.wide.any(
-            |node| slabs.meet(node, t_max - on).1,
+            |node| slabs.meet(node, t_max).1,
             pending,
             |leaf, _| {
                 let pack = &tree.leaves[leaf];
-                sheared.intersect(pack, local.t_min, t_max - on).any(|(lane, hit)| {
+                sheared.intersect(pack, local.t_min, t_max).any(|(lane, hit)| {
                     let flags = pack.flags(lane);
                     let mesh = || mesh_of(scene, instances[pack.part(lane) as usize]);
                     let asks =
@@ -272,21 +264,21 @@ impl Accel {
         )
     }
 
-    /// Looks for something nearer on one shape; `start` is how far along the whole ray `ray` starts.
+    /// Looks for something nearer on one shape.
     fn nearest_on(
         &self,
         scene: &Scene,
         placed: &PlacedShape,
         ray: &LocalRay,
-        start: f32,
         sides: Sides,
         nearest: &mut Nearest,
     ) {
-        let Some(RayHit { t, surface, front }) = placed.meet(scene, ray, nearest.hit.t - start, sides) else {
+        let t_max = nearest.hit.t - ray.start;
+        let Some(RayHit { t, surface, front }) = placed.meet(scene, ray, t_max, sides) else {
             return;
         };
         let SurfaceRef { instance, primitive, u, v } = surface;
-        let hit = TriangleHit { t: t + start, u, v, front };
+        let hit = TriangleHit { t: t + ray.start, u, v, front };
         let is_nearer =
             hit.t < nearest.hit.t || (instance, primitive) < (nearest.instance, nearest.primitive);
         if is_nearer {
@@ -304,21 +296,34 @@ pub(super) struct LocalRay {
     pub origin: Vec3,
     pub direction: Vec3,
     pub t_min: f32,
+    /// How far along the whole ray it starts.
+    pub start: f32,
 }
 
 impl LocalRay {
+    fn whole(&Ray { origin, direction, t_min, .. }: &Ray) -> Self {
+        Self { origin, direction, t_min, start: 0.0 }
+    }
+
+    /// The same from where it comes near to what it is to meet.
+    #[inline]
+    fn approaching(&self, bounds: &Bounds) -> Self {
+        let &Self { origin, direction, t_min, start } = self;
+        let on = bounds.approach(origin, direction);
+        Self { origin: origin + direction * on, direction, t_min: t_min - on, start: start + on }
+    }
+
     fn prepare(&self) -> (SlabRay, ShearedRay) {
         (SlabRay::new(self.origin, self.direction, self.t_min), ShearedRay::new(self.origin, self.direction))
     }
 }
 
 impl PlacedTree {
-    /// The ray in the group's own space, and how far along the given one it starts.
+    /// The ray in the group's own space.
     #[inline]
-    fn local(&self, ray: &LocalRay, bounds: &Bounds) -> (LocalRay, f32) {
+    fn local(&self, ray: &LocalRay, bounds: &Bounds) -> LocalRay {
         let origin = Vec3::from(self.object_from_render.transform_point3a(ray.origin.into()));
         let direction = Vec3::from(self.object_from_render.transform_vector3a(ray.direction.into()));
-        let start = bounds.approach(origin, direction);
-        (LocalRay { origin: origin + direction * start, direction, t_min: ray.t_min - start }, start)
+        LocalRay { origin, direction, ..*ray }.approaching(bounds)
     }
 }

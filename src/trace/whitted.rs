@@ -72,6 +72,16 @@ impl<'k> Path<'k> {
     }
 }
 
+/// A point of a path, and where it is looked at from.
+#[derive(Clone, Copy)]
+struct Vertex<'v> {
+    it: &'v SurfaceInteraction<'v>,
+    surface: &'v Surface,
+    toward: Vec3,
+    /// See [`Tracer::coverage`].
+    coverage: f32,
+}
+
 /// What comes back along a ray.
 #[derive(Clone, Copy, Default)]
 struct Seen {
@@ -139,12 +149,13 @@ impl Tracer<'_> {
         rays: &mut RayCounts,
     ) -> Radiance {
         let coverage = self.coverage(surface, path.bounces);
+        let vertex = &Vertex { it, surface, toward, coverage };
         let (mut specular, mut open) = (incoming.highlights, 0.0);
         if surface.f90 > 0.0 || surface.eta.is_some() {
-            specular += self.mirrored(it, surface, toward, incoming.openness, coverage, path, rays);
+            specular += self.mirrored(vertex, incoming.openness, path, rays);
         }
         if surface.transmittance != Vec3::ZERO {
-            let seen = self.transmitted(it, surface, toward, coverage, path, rays);
+            let seen = self.transmitted(vertex, path, rays);
             (specular, open) = (specular + seen.light, seen.open);
         }
         (specular, open) = (specular * coverage, open * coverage);
@@ -169,14 +180,10 @@ impl Tracer<'_> {
     }
 
     /// What the surface mirrors of other things: sharp where smooth, the world's blurred light where rough.
-    #[expect(clippy::too_many_arguments, reason = "what is known of the point, and how it is reached")]
     fn mirrored(
         &self,
-        it: &SurfaceInteraction,
-        surface: &Surface,
-        toward: Vec3,
+        &Vertex { it, surface, toward, coverage }: &Vertex<'_>,
         openness: f32,
-        coverage: f32,
         path: &Path<'_>,
         rays: &mut RayCounts,
     ) -> Vec3 {
@@ -211,10 +218,7 @@ impl Tracer<'_> {
     /// What passes through: bent by a solid, straight through a thin wall.
     fn transmitted(
         &self,
-        it: &SurfaceInteraction,
-        surface: &Surface,
-        toward: Vec3,
-        coverage: f32,
+        &Vertex { it, surface, toward, coverage }: &Vertex<'_>,
         path: &Path<'_>,
         rays: &mut RayCounts,
     ) -> Seen {
