@@ -17,6 +17,7 @@ mod geometry;
 mod gltf;
 mod ignored;
 mod image;
+mod instances;
 mod light_camera;
 mod material;
 mod meshopt;
