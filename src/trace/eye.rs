@@ -19,6 +19,8 @@ pub struct Eye {
     pub(super) pixel: f32,
     pub(super) near: f32,
     pub(super) far: f32,
+    /// Of the solid that it is inside, 1/m.
+    pub(super) absorption: Vec3,
 }
 
 impl Eye {
@@ -32,6 +34,7 @@ impl Eye {
             pixel: view.pixel_size() as f32,
             near: view.lens.near.max(0.0) as f32,
             far: view.lens.far as f32,
+            absorption: Vec3::ZERO,
         }
     }
 

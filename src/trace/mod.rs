@@ -17,6 +17,7 @@ mod interaction;
 mod known;
 mod lanes;
 mod light;
+mod medium;
 mod panel;
 mod parts;
 mod point;
@@ -87,6 +88,12 @@ impl Radiance {
     pub fn total(&self) -> Vec3 {
         self.diffuse + self.specular + self.emission
     }
+
+    /// What is left of it behind something that lets a share through; it covers as much.
+    fn behind(&self, share: Vec3) -> Self {
+        let Self { diffuse, specular, emission, alpha } = *self;
+        Self { diffuse: diffuse * share, specular: specular * share, emission: emission * share, alpha }
+    }
 }
 
 /// Traces rays through a scene at one time. Shared by all threads.
@@ -128,7 +135,9 @@ impl<'a> Tracer<'a> {
 
     /// The eye of a view, for everything that is asked of its pixels.
     pub fn eye(&self, view: &View) -> Eye {
-        Eye::new(view, self.accel)
+        let mut eye = Eye::new(view, self.accel);
+        eye.absorption = self.absorption_at(eye.position);
+        eye
     }
 
     /// Words of 32 shadow bits that a sample needs; see [`lit_words`].
@@ -301,7 +310,8 @@ impl<'a> Tracer<'a> {
         let mut room = None;
         let surface = self.surface(&it, &mut room);
         let irradiance = unshadowed.irradiance * share;
-        finite(surface.albedo * irradiance * FRAC_1_PI * self.coverage(surface, 0))
+        let leaving = surface.albedo * irradiance * FRAC_1_PI * self.coverage(surface, 0);
+        finite(leaving * eye.lets_through(sample.position))
     }
 
     fn point_of(&self, sample: &SurfaceSample) -> SurfacePoint<'a> {

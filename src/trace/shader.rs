@@ -135,7 +135,8 @@ impl<'t> Shader<'t, '_> {
                 incoming.irradiance += brought.irradiance.lane(lane);
                 incoming.highlights += highlights.lane(lane);
             }
-            let leaving = tracer.leaving(it, surface, toward, &incoming, &Path::new(beam(lane), known), rays);
+            let path = Path::new(eye, it.point.position, beam(lane), known);
+            let leaving = tracer.leaving(it, surface, toward, &incoming, &path, rays).behind(path.share);
             let is_finite = leaving.total().is_finite();
             radiance[lane] = if is_finite { leaving } else { leaving.where_finite() };
         }

@@ -4,12 +4,13 @@ use super::ggx::{environment_share, refract};
 use super::interaction::{Beam, SurfaceInteraction};
 use super::lanes::Lanes;
 use super::light::{Emitter, Unshadowed};
+use super::medium::absorption;
 use super::point::{Side, SurfacePoint};
 use super::punctual::PunctualLights;
 use super::receivers::{Brought, Receivers};
 use super::surface::Surface;
 use super::visibility::Inquiry;
-use super::{Radiance, Tracer};
+use super::{Eye, Radiance, Tracer};
 use crate::accel::{Ray, Sides};
 use crate::frame::{RayCounts, SurfaceSample};
 use glam::{Vec3, Vec4};
@@ -27,7 +28,7 @@ pub(super) struct Path<'k> {
     /// Mirrored and refracted rays so far.
     bounces: u32,
     /// Share of what leaves the point that reaches the pixel.
-    share: Vec3,
+    pub share: Vec3,
     /// What the first of those rays was; all that follow are counted with it.
     kind: Option<Kind>,
     beam: Beam,
@@ -47,9 +48,10 @@ enum Kind {
 }
 
 impl<'k> Path<'k> {
-    /// From the eye.
-    pub fn new(beam: Beam, known: Option<&'k KnownLight<'k>>) -> Self {
-        Self { bounces: 0, share: Vec3::ONE, kind: None, beam, straight: true, inside: Vec3::ZERO, known }
+    /// From the eye to a point.
+    pub fn new(eye: &Eye, point: Vec3, beam: Beam, known: Option<&'k KnownLight<'k>>) -> Self {
+        let share = eye.lets_through(point);
+        Self { bounces: 0, share, kind: None, beam, straight: true, inside: eye.absorption, known }
     }
 
     /// On by a ray of `kind` that carries `share`, in another direction.
@@ -310,14 +312,4 @@ impl Tracer<'_> {
         let leaving = self.leaving(&it, surface, -direction, &incoming, &path, rays);
         Seen { light: passed * leaving.total(), open: 1.0 - leaving.alpha }
     }
-}
-
-/// Absorption of a solid, 1/m: what is left after the attenuation distance is the attenuation colour. A colour of 0
-/// lets a hundred-thousandth through.
-fn absorption(volume: &crate::scene::Volume) -> Vec3 {
-    let distance = volume.attenuation_distance;
-    if !(distance > 0.0 && distance.is_finite()) {
-        return Vec3::ZERO;
-    }
-    volume.attenuation_color.clamp(Vec3::splat(1e-5), Vec3::ONE).map(|c| -c.ln() / distance)
 }

@@ -1,7 +1,7 @@
 //! What passes through: glass, thin walls, blending, holes.
 
 use crate::rig::*;
-use buzz::scene::{AlphaMode, ColorSpace, Image, Material, Scene, TextureRef, Volume, Wrap};
+use buzz::scene::{AlphaMode, ColorSpace, Image, Material, Mesh, Scene, Shape, TextureRef, Volume, Wrap};
 use glam::{Affine2, DVec3, Vec3};
 
 /// Looking straight down through a slab of `material` between heights 1 and 2 at a glowing floor.
@@ -30,6 +30,34 @@ fn coloured_glass_absorbs_by_distance() {
     let pixel = Rig::new(slab(Material { volume, ..glass() })).center();
     let expected = Vec3::new(0.5f32.sqrt(), 0.5, 1.0) * 2.0 * 0.96 * 0.96;
     assert!(close(pixel.radiance.total(), expected), "{:?} {expected}", pixel.radiance);
+}
+
+#[test]
+fn an_eye_under_water_sees_less_of_what_is_far() {
+    // In a pool 4 m deep, 3 m above its glowing ground; a ball of clear glass and a raft are over it.
+    let color = Vec3::new(0.5, 0.25, 1.0);
+    let volume = Some(Volume { attenuation_distance: 2.0, attenuation_color: color });
+    let water = Material { volume, ..glass() };
+    let pool = |eye: f64, water: Material| {
+        let mut scene = floor(glowing(Vec3::splat(2.0)));
+        scene.cameras.clear();
+        add_plane(&mut scene, matt(Vec3::ONE), 3.0, upside_down(3.9));
+        add_plane(&mut scene, water, 10.0, at(0.0, 4.0, 0.0));
+        let ball = scene.add_material(glass());
+        let ball = scene.add_mesh(Mesh::analytic(Shape::sphere(0.02), ball));
+        scene.add_instance(ball, at(0.1845, eye + 0.453, 0.1035));
+        scene.add_camera(DVec3::new(0.0, eye, 0.0), DVec3::ZERO, 0.8);
+        Rig::new(scene)
+    };
+    let seen = |rig: &Rig| rig.center().radiance.total();
+    let below = pool(3.0, water.clone());
+    let expected = Vec3::new(0.5f32.powf(1.5), 0.125, 1.0) * 2.0;
+    assert!(close(seen(&below), expected), "{} {expected}", seen(&below));
+    // From above it has the whole depth before it, and loses what the surface mirrors.
+    let above = pool(5.0, water.clone());
+    assert!(close(seen(&above), Vec3::new(0.25, 0.0625, 1.0) * 2.0 * 0.96), "{}", seen(&above));
+    // What only the water dims is the same without it.
+    assert!(close(seen(&pool(3.0, glass())), Vec3::splat(2.0)));
 }
 
 #[test]
