@@ -109,3 +109,18 @@ def expected_projection(ob, depsgraph) -> np.ndarray:
     x, y = render.resolution_x * percent // 100, render.resolution_y * percent // 100
     evaluated = ob.evaluated_get(depsgraph)
     return np.array(evaluated.calc_matrix_camera(depsgraph, x=x, y=y, scale_x=render.pixel_aspect_x, scale_y=render.pixel_aspect_y))
+
+
+def world_points(gltf, node, frame):
+    """Sorted world vertices of a node."""
+    points = gltf.triangles(node).reshape(-1, 3)
+    m = gltf.world(node, frame)
+    return np.unique(np.round(points @ m[:3, :3].T + m[:3, 3], 4), axis=0)
+
+
+def blender_points(ob, depsgraph):
+    """Sorted evaluated world vertices in glTF axes."""
+    evaluated = ob.evaluated_get(depsgraph)
+    m = YUP @ np.array(evaluated.matrix_world)
+    points = np.array([v.co for v in evaluated.data.vertices])
+    return np.unique(np.round(points @ m[:3, :3].T + m[:3, 3], 4) + 0.0, axis=0)

@@ -164,9 +164,9 @@ def test_deformation(blender, stage, pictures, tmp_path):
 
 def test_instances_and_metaballs(blender, stage, pictures, tmp_path):
     import blender_scene as b
-    import test_blender_geometry
+    import test_blender_instances
 
-    test_blender_geometry.scatter(blender, "Scatter", 4)
+    test_blender_instances.scatter(blender, "Scatter", 4)
     ball = blender.data.metaballs.new("Ball")
     ball.elements.new().co = (0, 0, 2)
     b.link(blender.data.objects.new("Ball", ball))
