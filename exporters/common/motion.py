@@ -19,6 +19,8 @@ ANGLE_TOLERANCE = 2.5e-4
 MAX_STEPS = 8
 _SHEAR = 2e-5
 _SAME = 1e-7
+# How thick what is flat becomes, of its greatest scale: single precision leaves less than that of a scale of 0 that is turned.
+_THIN = 1e-6
 
 
 def steps_between(poses: np.ndarray, size: float) -> np.ndarray:
@@ -94,6 +96,18 @@ def split_trs(matrices: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]
     return matrices[:, :3, 3], rotations, scales
 
 
+def thickened(matrices: np.ndarray) -> np.ndarray:
+    """Matrices (n, 4, 4) that can be inverted, as a renderer does: what a scale of 0 has made flat is thin. What is a line is not seen."""
+    out = np.array(matrices, dtype=float)
+    side = -1.0 if np.linalg.det(out[:, :3, :3]).sum() < 0 else 1.0
+    u, scales, vt = np.linalg.svd(out[:, :3, :3])
+    thin = _THIN * scales[:, 0]
+    for i in np.flatnonzero((scales[:, 2] < thin) & (thin > 0)):
+        third = side * np.linalg.det(u[i] @ vt[i]) * thin[i]
+        out[i, :3, :3] = u[i] @ np.diag([*scales[i, :2], third]) @ vt[i] if scales[i, 1] >= thin[i] else 0
+    return out
+
+
 _TURNS = [
     np.eye(3)[list(p)] * np.array(s)[:, None]
     for p in permutations(range(3))
@@ -166,6 +180,7 @@ class Animation:
 
     def add_node(self, node: dict, poses: np.ndarray) -> int:
         """Append a node that moves as `poses` say, below another where it is sheared; its index."""
+        poses = thickened(poses)
         if not is_sheared(poses):
             index = self.document.append("nodes", node)
             self.node(node, index, poses)
