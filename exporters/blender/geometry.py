@@ -28,6 +28,8 @@ _DEFORMS = {
     "MESH_DEFORM", "SHRINKWRAP", "SIMPLE_DEFORM", "SMOOTH", "SOFT_BODY", "SURFACE_DEFORM", "WARP", "WAVE",
 }  # fmt: skip
 _DEFORMING_PARENTS = ("ARMATURE", "LATTICE", "CURVE")
+# What names of attributes begin with that geometry nodes have made by themselves.
+_ANONYMOUS = ".a_"
 # Other objects that a curve's or a text's own data is shaped by.
 _SHAPED_BY = ("bevel_object", "taper_object", "follow_curve")
 
@@ -123,6 +125,9 @@ class GeometryStore:
     def _new(self, ob: bpy.types.Object, topology: bytes) -> int:
         # new_from_object() gives the mesh of the instancer for geometry-nodes instances; a copy of the evaluated data does not.
         mesh = ob.data.copy()
+        # What geometry nodes pass on among themselves has no name that a material could ask for, and is lost in edit mode.
+        for attribute in [a for a in mesh.attributes if a.name.startswith(_ANONYMOUS)]:
+            mesh.attributes.remove(attribute)
         # Generated coordinates are measured by the box of the mesh before its modifiers, which the evaluated one still has.
         mesh.use_auto_texspace = False
         if _is_deformed(ob.original):

@@ -118,3 +118,29 @@ def test_geometry_nodes_may_make_several_meshes_of_one_form(blender, export):
     nodes = [i for i, n in enumerate(gltf.root["nodes"]) if n["name"] == "Blocks"]
     sizes = sorted(round(float(np.ptp(gltf.triangles(n)[..., 0])), 4) for n in nodes)
     assert sizes == [1, 2, 3]
+
+
+def test_coordinates_without_a_name_are_no_uv_map(blender, export):
+    """Those that a mesh primitive gives to other nodes, under a material that is baked."""
+    import blender_scene as b
+
+    b.camera()
+    ob = b.cube("Grid")
+    tree = blender.data.node_groups.new("Grid", "GeometryNodeTree")
+    tree.interface.new_socket("Geometry", in_out="OUTPUT", socket_type="NodeSocketGeometry")
+    grid, store, end = (tree.nodes.new(kind) for kind in ("GeometryNodeMeshGrid", "GeometryNodeStoreNamedAttribute", "NodeGroupOutput"))
+    coloured = tree.nodes.new("GeometryNodeSetMaterial")
+    store.data_type, store.domain = "FLOAT_VECTOR", "CORNER"
+    store.inputs["Name"].default_value = "place"
+    tree.links.new(grid.outputs["Mesh"], store.inputs["Geometry"])
+    tree.links.new(grid.outputs["UV Map"], next(s for s in store.inputs if s.name == "Value" and s.enabled))
+    tree.links.new(store.outputs[0], coloured.inputs["Geometry"])
+    tree.links.new(coloured.outputs[0], end.inputs[0])
+    made, shader = b.material()
+    noise = made.node_tree.nodes.new("ShaderNodeTexNoise")
+    made.node_tree.links.new(noise.outputs["Color"], shader.inputs["Base Color"])
+    coloured.inputs["Material"].default_value = made
+    ob.modifiers.new("Grid", "NODES").node_group = tree
+    gltf = export(bake=16)
+    attributes = gltf.root["meshes"][gltf.root["nodes"][gltf.node("Grid")]["mesh"]]["primitives"][0]["attributes"]
+    assert sorted(attributes) == ["NORMAL", "POSITION", "TEXCOORD_0"]
