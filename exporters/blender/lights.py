@@ -15,7 +15,7 @@ import numpy as np
 
 from ..common.document import Document
 from ..common.extras import LUMENS_PER_WATT, tidy
-from ..common.motion import Animation
+from ..common.motion import Animation, is_sheared
 from ..common.report import Lost
 from .cameras import view_matrix
 from .constants import constant
@@ -34,11 +34,13 @@ class LightTrack:
     values: list[dict[str, float]] = field(default_factory=list)
     visible: list[bool] = field(default_factory=list)
     stretched: bool = False
+    sheared: bool = False
 
     def sample(self, data: bpy.types.Light, world: np.ndarray, visible: bool) -> None:
         """Record a light's evaluated data and world matrix."""
         scale = np.linalg.norm(np.array(world)[:3, :3], axis=0)
         self.stretched = self.stretched or bool(scale.max() > scale.min() * (1 + 1e-3))
+        self.sheared = self.sheared or is_sheared(np.array(world)[None])
         self.poses.append(view_matrix(world))
         self.values.append(_values(data, scale))
         self.visible.append(visible)
@@ -56,6 +58,8 @@ class LightTrack:
         _warn(self.name, self.data, engine, lost)
         if self.data.type == "SPOT" and self.stretched:
             lost.add(self.name, "spot with different scales", "its cone is round; apply the scale, or use an area light")
+        if self.data.type == "AREA" and self.sheared:
+            lost.add(self.name, "sheared area light", "it keeps its right angles and what it faces; apply the scale of its parents")
         values = {key: np.array([sample[key] for sample in self.values]) for key in self.values[0]}
         document.use_extension("KHR_lights_punctual")
         lights = document.root.setdefault("extensions", {}).setdefault("KHR_lights_punctual", {}).setdefault("lights", [])

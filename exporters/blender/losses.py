@@ -54,6 +54,8 @@ def name_scene_losses(scene: bpy.types.Scene, view_layer: bpy.types.ViewLayer, l
     rendered = rendered_objects(view_layer)
     for ob in _with_instanced([ob for ob in scene.objects if ob.name_full in rendered]):
         _name_object(ob, lost)
+        if render.engine == "CYCLES" and (fine := _adaptive(ob)) is not None:
+            lost.add(ob.name, "adaptive subdivision", f"it is subdivided {fine.render_levels} times, near and far; raise its Levels Render")
 
 
 def _strips(editor: bpy.types.SequenceEditor) -> bool:
@@ -123,6 +125,14 @@ def _name_object(ob: bpy.types.Object, lost: Lost) -> None:
     for system in ob.particle_systems:
         if system.settings.type == "HAIR" and system.settings.render_type == "PATH":
             lost.add(ob.name, "hair", "it is left out; convert it to a mesh first (Object > Convert)")
+
+
+def _adaptive(ob: bpy.types.Object) -> bpy.types.Modifier | None:
+    """The subdivision of an object that Cycles makes as fine as its pixels: only the last modifier can be."""
+    last = next((modifier for modifier in reversed(ob.modifiers) if modifier.show_render), None)
+    # Before Blender 5.0 it was a setting of the object.
+    holder = last if hasattr(last, "use_adaptive_subdivision") else getattr(ob, "cycles", None)
+    return last if last is not None and last.type == "SUBSURF" and getattr(holder, "use_adaptive_subdivision", False) else None
 
 
 def _name_layers(layer: bpy.types.LayerCollection, lost: Lost) -> None:

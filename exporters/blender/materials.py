@@ -22,7 +22,7 @@ from .prepare import is_animated
 PLACED = "placed"
 # The property of a mesh that is bent out of its first form, and of the node of an image that depends on what that was.
 DEFORMED = "deformed"
-_DROPPED = {"Subsurface Weight": "subsurface scattering", "Thin Film Thickness": "thin film"}
+_DROPPED = {"Diffuse Roughness": "diffuse roughness", "Subsurface Weight": "subsurface scattering", "Thin Film Thickness": "thin film"}
 
 
 def prepare_materials(materials: list[bpy.types.Material], lost: Lost) -> None:
@@ -194,6 +194,9 @@ def _name_losses(shader: bpy.types.Node, meshes: list[bpy.types.Mesh], name: str
         value = shader.inputs.get(key)
         if value is not None and (value.is_linked or value.default_value > 0):
             lost.add(name, label, "it is rendered as without it")
+    tint, metal = shader.inputs["Specular Tint"], shader.inputs["Metallic"]
+    if (metal.is_linked or metal.default_value > 0) and (tint.is_linked or min(tint.default_value) < 1):
+        lost.add(name, "specular tint of a metal", "its rim is white; tint the base color instead")
 
 
 def _drop_broken_groups(tree: bpy.types.NodeTree, name: str, lost: Lost) -> None:

@@ -133,6 +133,17 @@ def test_what_a_light_loses_is_named(blender, export):
     assert {"area light spread", "light without shadows"} <= set(features)
 
 
+def test_a_sheared_area_light_is_named(blender, export):
+    import blender_scene as b
+
+    ob = make(blender, "AREA")
+    ob.parent = b.link(blender.data.objects.new("Rig", None))
+    ob.parent.scale = (2, 1, 1)
+    assert export().lost_features("Light") == []
+    ob.rotation_euler = (0.3, 0.2, 0.8)
+    assert export().lost_features("Light") == ["sheared area light"]
+
+
 def test_portals_do_not_shine(blender, export):
     make(blender, "AREA").data.cycles.is_portal = True
     assert "lights" not in export().root.get("extensions", {}).get("KHR_lights_punctual", {})

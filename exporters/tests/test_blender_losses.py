@@ -146,3 +146,30 @@ def test_drivers_that_fail_are_named(blender, export, monkeypatch):
     assert gltf.lost_features("Lifted") == ["drivers that fail: location"]
     assert gltf.lost_features("Turned") == []
     assert [f for f in gltf.lost_features("Glowing") if "driver" in f] == ['drivers that fail: nodes["Principled BSDF"].inputs["Metallic"].default_value']
+
+
+@pytest.mark.parametrize(("engine", "after", "named"), [("CYCLES", False, True), ("CYCLES", True, False), ("BLENDER_EEVEE", False, False)])
+def test_adaptive_subdivision_is_named(blender, export, engine, after, named):
+    import blender_scene as b
+
+    if blender.app.version < (5, 0):
+        pytest.skip("a setting of the object before Blender 5.0")
+    b.camera()
+    blender.context.scene.render.engine = engine
+    ob = b.cube()
+    ob.modifiers.new("Fine", "SUBSURF").use_adaptive_subdivision = True
+    if after:
+        ob.modifiers.new("Edge", "BEVEL")
+    assert ("adaptive subdivision" in export().lost_features("Cube")) == named
+
+
+def test_what_principled_has_beyond_gltf_is_named(blender, surface, export):
+    names = {"Diffuse Roughness": 0.5, "Subsurface Weight": 0.5, "Thin Film Thickness": 300.0}
+    there = [name for name in names if name in surface.inputs]
+    for name in there:
+        surface.inputs[name].default_value = names[name]
+    surface.inputs["Specular Tint"].default_value = (0.2, 0.4, 1, 1)
+    labels = {"Diffuse Roughness": "diffuse roughness", "Subsurface Weight": "subsurface scattering", "Thin Film Thickness": "thin film"}
+    assert export().lost_features("Grey") == [labels[name] for name in there]
+    surface.inputs["Metallic"].default_value = 1.0
+    assert export().lost_features("Grey") == [*(labels[name] for name in there), "specular tint of a metal"]

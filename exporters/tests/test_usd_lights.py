@@ -183,6 +183,16 @@ def test_round_lights_scaled_unevenly_are_named(usd_convert, kind, scale, named)
     assert ("round light that is scaled unevenly" in usd_convert(made).lost_features("/World/Light")) == named
 
 
+@pytest.mark.parametrize(("kind", "turn", "named"), [("RectLight", 30, True), ("DiskLight", 30, True), ("RectLight", 0, False)])
+def test_sheared_lights_are_named(usd_convert, kind, turn, named):
+    made = u.stage()
+    u.camera(made)
+    UsdGeom.XformCommonAPI(UsdGeom.Xform.Define(made, "/World/Rig")).SetScale((2, 1, 1))
+    light = getattr(UsdLux, kind).Define(made, "/World/Rig/Light")
+    UsdGeom.XformCommonAPI(light).SetRotate((0, 0, turn))
+    assert usd_convert(made).lost_features("/World/Rig/Light") == (["sheared area light"] if named else [])
+
+
 def test_shadow_colours_are_named(usd_convert):
     made = u.stage()
     u.camera(made)

@@ -17,7 +17,7 @@ from pxr import Usd, UsdGeom, UsdLux
 
 from ..common.document import Document
 from ..common.extras import LUMENS_PER_WATT, tidy
-from ..common.motion import Animation, unscaled
+from ..common.motion import Animation, is_sheared, unscaled
 from ..common.report import Lost
 from . import exr
 from .output import Output
@@ -56,6 +56,7 @@ class LightTrack:
     visible: list[bool] = field(default_factory=list)
     # Whether a round light is ever scaled to what is not round.
     uneven: bool = False
+    sheared: bool = False
 
     def sample(self, time: Usd.TimeCode, world: np.ndarray, visible: bool, units: float) -> None:
         """Record the light; `world` is its matrix in glTF's space, `units` metres per stage unit."""
@@ -63,6 +64,7 @@ class LightTrack:
         self.values.append(_values(self.prim, time, scale, units))
         across = scale[_ROUND[self.prim.GetTypeName()]] if self.prim.GetTypeName() in _ROUND else scale[:1]
         self.uneven |= bool(np.ptp(across) > 1e-3 * across.max())
+        self.sheared |= self.prim.GetTypeName() in ("RectLight", "DiskLight") and is_sheared(world[None])
         self.poses.append(unscaled(world))
         self.visible.append(visible)
 
@@ -81,6 +83,8 @@ class LightTrack:
         _warn(self.prim, lost)
         if self.uneven:
             lost.add(path, "round light that is scaled unevenly", "it stays round; scale it evenly, or use a disk light")
+        if self.sheared:
+            lost.add(path, "sheared area light", "it keeps its right angles and what it faces; scale it without its parents")
         values = {k: np.array([v[k] for v in self.values]) for k in self.values[0]}
         first = self.values[0]
         wide = values.get("outer", np.full(1, _HALF_PI)) > _WIDEST_CONE
