@@ -68,7 +68,9 @@ def test_skinned_meshes_are_baked(usd_convert):
     made = u.stage(frames=(1, 3))
     u.camera(made)
     model(made, "/World/Actor")
-    assert moves(usd_convert(made)) == [True]
+    gltf = usd_convert(made)
+    assert moves(gltf) == [True]
+    assert not gltf.lost_features("/World/Actor/Model/Card")
 
 
 def test_models_in_instances(usd_convert, tmp_path):

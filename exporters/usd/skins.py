@@ -19,6 +19,8 @@ def bake_skins(stage: Usd.Stage, span: list[float], lost: Lost, said: Said, prog
         # Baking writes points, which instances of one prototype cannot have of their own. Others may lie in these.
         for path in held:
             stage.GetPrimAtPath(path).SetInstanceable(False)
+    # A SkelRoot that is baked is none any more.
+    _name_outside(stage, lost)
     roots = [p.GetPath() for p in stage.Traverse(_DRAWN) if p.IsA(UsdSkel.Root)]
     # UsdSkel passes over what is not defined: it is for as long as the baking takes.
     overs = {p for root in roots for p in root.GetPrefixes() if not stage.GetPrimAtPath(p).HasDefiningSpecifier()}
@@ -35,7 +37,6 @@ def bake_skins(stage: Usd.Stage, span: list[float], lost: Lost, said: Said, prog
         if not baked and len(lost.items) == missing:
             lost.add(path, "skinning", "UsdSkel could not bake it; it stands in its rest pose")
     _specify(stage, overs, Sdf.SpecifierOver)
-    _name_outside(stage, lost)
 
 
 def _name_outside(stage: Usd.Stage, lost: Lost) -> None:
