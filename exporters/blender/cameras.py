@@ -15,7 +15,7 @@ from mathutils import Matrix
 
 from ..common.document import Document
 from ..common.extras import tidy
-from ..common.motion import Animation, unscaled
+from ..common.motion import Animation, is_sheared, unscaled
 from ..common.report import Lost
 
 # Blender is Z-up, glTF Y-up; cameras and lights look along -Z in both.
@@ -23,7 +23,7 @@ YUP = np.array(Matrix.Rotation(-math.pi / 2, 4, "X"))
 
 
 def view_matrix(world: Matrix) -> np.ndarray:
-    """World matrix of a camera or light in glTF axes, scale and shear taken off (Blender's renderer does the same)."""
+    """World matrix of a camera or light in glTF axes, scale (as in Blender's renderer) and shear taken off."""
     return unscaled(YUP @ np.array(world))
 
 
@@ -36,6 +36,7 @@ class CameraTrack:
     lens: list[dict[str, float]] = field(default_factory=list)
     node: int = -1
     broken: bool = False
+    sheared: bool = False
 
     def sample(self, depsgraph: bpy.types.Depsgraph, size: tuple[int, int], aspect: tuple[float, float]) -> None:
         """Record pose and lens at the scene's current frame."""
@@ -63,6 +64,7 @@ class CameraTrack:
         else:
             lens["focus"] = data.dof.focus_distance
         lens["fstop"] = data.dof.aperture_fstop
+        self.sheared = self.sheared or is_sheared(np.array(ob.matrix_world)[None])
         self.poses.append(view_matrix(ob.matrix_world))
         self.lens.append(lens)
 
@@ -83,6 +85,8 @@ class CameraTrack:
             lost.add(name, f"{data.type.lower()} camera", action)
         if min(np.linalg.det(np.array(self.source.matrix_world)[:3, :3]), 0) < 0:
             lost.add(name, "mirrored camera (negative scale)", "the picture is not mirrored; apply the scale of the camera and its parents")
+        if self.sheared:
+            lost.add(name, "sheared camera", "its picture is not sheared and shows another part; apply the scale of its parents")
         near, far = float(first["near"]), float(first["far"])
         limits = {"znear": tidy(near)} | ({"zfar": tidy(far)} if far > near else {})
         index = len(document.list("cameras"))

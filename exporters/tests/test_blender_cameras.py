@@ -213,3 +213,14 @@ def test_a_camera_without_a_picture_stops_only_its_own_shots(blender, export, ca
     assert gltf.lost_features("Bad") == ["lens or transform that is no usable number"]
     with pytest.raises(InputError, match="camera 'Bad': its lens or transform is no usable number"):
         export(camera="Bad")
+
+
+def test_a_sheared_camera_is_named(blender, export):
+    import blender_scene as b
+
+    camera = b.camera()
+    camera.parent = b.link(blender.data.objects.new("Rig", None))
+    camera.parent.scale = (2, 1, 1)
+    assert export().lost_features("Camera") == []
+    camera.parent.scale = (1, 1, 2)
+    assert export().lost_features("Camera") == ["sheared camera"]
