@@ -169,7 +169,7 @@ def test_texture_transform_turns_over(usd_convert, tmp_path):
         want = (2 * s * math.cos(a) - 3 * t * math.sin(a) + 0.25, 2 * s * math.sin(a) + 3 * t * math.cos(a) + 0.5)
         # KHR_texture_transform: offset + rotation * scale * uv, with rotation's columns (cos, -sin), (sin, cos) for v down.
         r, (x, y) = info["rotation"], (info["scale"][0] * s, info["scale"][1] * (1 - t))
-        got = (info["offset"][0] + math.cos(r) * x + -math.sin(r) * y, info["offset"][1] + math.sin(r) * x + math.cos(r) * y)
+        got = (info["offset"][0] + math.cos(r) * x + math.sin(r) * y, info["offset"][1] - math.sin(r) * x + math.cos(r) * y)
         assert got == (pytest.approx(want[0], abs=1e-6), pytest.approx(1 - want[1], abs=1e-6))
 
 

@@ -15,17 +15,18 @@ from pxr import Gf, Sdf, UsdShade
 
 # 128 / 255 as a linear value that is written sRGB-coded, and as an sRGB code that is written linear.
 ENCODED, DECODED = 188, 55
+SQUARE = ((0, 0), (1, 0), (1, 1), (0, 1))
 
 
 @pytest.fixture
 def card(usd_convert, tmp_path):
     """Convert a card: card(input, file, output, **texture inputs) gives the document, its material."""
 
-    def run(*textures, transforms=(), circle=False, reader="UsdPrimvarReader_float2", **surface):
+    def run(*textures, transforms=(), circle=False, reader="UsdPrimvarReader_float2", corners=SQUARE, **surface):
         made = u.stage()
         u.camera(made)
         prim = u.quad(made, "/World/Card")
-        u.uv(prim, [(0, 0), (1, 0), (1, 1), (0, 1)])
+        u.uv(prim, corners)
         material = u.preview(made, "/World/M", **surface)
         for name, file, output, inputs in textures:
             node = u.texture(made, material, name, file, output, **inputs)
@@ -151,9 +152,27 @@ def test_chained_transforms(card, tmp_path):
             p = p * step.get("scale", (1, 1))
             p = np.array([[math.cos(a), -math.sin(a)], [math.sin(a), math.cos(a)]]) @ p + step.get("translation", (0, 0))
         r, (x, y) = info["rotation"], (info["scale"][0] * s, info["scale"][1] * (1 - t))
-        got = (info["offset"][0] + math.cos(r) * x - math.sin(r) * y, info["offset"][1] + math.sin(r) * x + math.cos(r) * y)
+        got = (info["offset"][0] + math.cos(r) * x + math.sin(r) * y, info["offset"][1] - math.sin(r) * x + math.cos(r) * y)
         assert got == (pytest.approx(p[0], abs=1e-6), pytest.approx(1 - p[1], abs=1e-6))
     assert not gltf.lost_features("/World/M")
+
+
+@pytest.mark.parametrize("scale", [(1.5, 0.7), (-1.5, 0.7), (0.5, -0.5)])
+def test_a_turned_image_is_seen_as_with_turned_coordinates(card, buzz, tmp_path, scale):
+    import render_tools as r
+
+    x, y = np.meshgrid(np.arange(16) * 16, np.arange(16) * 16)
+    Image.fromarray(np.stack([x, y, 255 - x], axis=2).astype(np.uint8)).save(tmp_path / "ramps.png")
+    a = math.radians(30)
+    turned = [(scale[0] * s * math.cos(a) - scale[1] * t * math.sin(a), scale[0] * s * math.sin(a) + scale[1] * t * math.cos(a)) for s, t in SQUARE]
+    step = {"rotation": 30.0, "scale": Gf.Vec2f(*scale)}
+    seen = []
+    for options in ({"transforms": [step]}, {"corners": turned}):
+        gltf, _ = card(("diffuseColor", "ramps.png", "rgb", {}), **options)
+        buzz(gltf.path, tmp_path / "out", "-q", "full", "-r", "32x24", "-f", "1", "--overwrite")
+        seen.append(r.rgb(r.read_exr(r.frames_of(tmp_path / "out")[1])))
+    assert np.ptp(seen[0]) > 0.2
+    np.testing.assert_allclose(seen[0], seen[1], atol=2e-3)
 
 
 def test_sheared_coordinates_are_named(card, tmp_path):

@@ -141,11 +141,11 @@ class Readers:
         return np.array([[c * sx, -s * sy, tx], [s * sx, c * sy, ty], [0, 0, 1]])
 
     def _turned_over(self, matrix: np.ndarray) -> dict[str, Any]:
-        """A matrix for v from the bottom as KHR_texture_transform, whose v comes from the top."""
+        """A matrix for v from the bottom as KHR_texture_transform, whose v comes from the top, and whose rotation turns as the image is seen."""
         m = _TURNED_OVER @ matrix @ _TURNED_OVER
         u, v = m[:2, 0], m[:2, 1]
         if abs(u @ v) > 1e-6 * np.linalg.norm(u) * np.linalg.norm(v):
             self.lost.add(self.path, "texture transforms that shear together", "the image is not sheared; turn it before it is scaled unevenly")
-        angle = math.atan2(u[1], u[0]) if u.any() else math.atan2(-v[0], v[1])
-        height = v @ (-math.sin(angle), math.cos(angle))
+        angle = math.atan2(-u[1], u[0]) if u.any() else math.atan2(v[0], v[1])
+        height = v @ (math.sin(angle), math.cos(angle))
         return {"offset": [tidy(x) for x in m[:2, 2]], "rotation": tidy(angle), "scale": [tidy(np.linalg.norm(u)), tidy(height)]}
