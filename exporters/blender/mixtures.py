@@ -5,7 +5,7 @@ from __future__ import annotations
 import bpy
 
 from .constants import constant, converted
-from .nodes import placed, source, upstream
+from .nodes import placed, source
 
 # A Mix Shader's factor, and whether the other shader is what is left of it.
 Cover = tuple[bpy.types.NodeSocket, bool]
@@ -66,7 +66,7 @@ def _mixture(node: bpy.types.Node) -> tuple[bpy.types.NodeSocket, Cover] | None:
         return None
     factor, *shaders = node.inputs
     first, second = map(source, shaders)
-    if first is None or second is None or placed(factor) or any(out.name == "Backfacing" for out in upstream(factor)):
+    if first is None or second is None or placed(factor):
         return None
     if factor.is_linked and source(factor) is None:
         return None

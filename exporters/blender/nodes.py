@@ -23,11 +23,11 @@ PAIRS = (("Base Color", "Alpha"), ("Metallic", "Roughness"))
 # Inputs that glTF holds as a constant.
 CONSTANTS = ("Emission Strength", "IOR")
 NORMALS = ("Normal", "Coat Normal")
-# Nodes whose outputs differ between objects that share a mesh, or with the view.
+# Nodes whose outputs differ between objects that share a mesh, or with the view (which of two sides is seen).
 _PLACED = {
     "OBJECT_INFO", "PARTICLE_INFO", "HAIR_INFO", "POINT_INFO", "CAMERA", "LIGHT_PATH", "LAYER_WEIGHT", "FRESNEL", "AMBIENT_OCCLUSION",
 }  # fmt: skip
-_PLACED_OUTPUTS = {"NEW_GEOMETRY": {"Position", "Normal", "Tangent", "True Normal", "Incoming"}, "TEX_COORD": {"Camera", "Window", "Reflection"}}
+_PLACED_OUTPUTS = {"NEW_GEOMETRY": {"Position", "Normal", "Tangent", "True Normal", "Incoming", "Backfacing"}, "TEX_COORD": {"Camera", "Window", "Reflection"}}
 # Nodes that take generated coordinates where they are given none.
 _GENERATED = {"TEX_BRICK", "TEX_CHECKER", "TEX_GABOR", "TEX_GRADIENT", "TEX_MAGIC", "TEX_NOISE", "TEX_VORONOI", "TEX_WAVE"}
 

@@ -282,6 +282,7 @@ def test_alpha_clip_is_read(blender, surface, export):
 @pytest.mark.parametrize(("kind", "output", "label"), [
     ("ObjectInfo", "Random", "object info node"),
     ("NewGeometry", "Position", "new geometry node"),
+    ("NewGeometry", "Backfacing", "new geometry node"),
     ("TexCoord", "Window", "coord node"),
 ])  # fmt: skip
 def test_what_depends_on_the_place_is_named(blender, surface, export, kind, output, label):
