@@ -194,6 +194,9 @@ def _name_losses(shader: bpy.types.Node, meshes: list[bpy.types.Mesh], name: str
         value = shader.inputs.get(key)
         if value is not None and (value.is_linked or value.default_value > 0):
             lost.add(name, label, "it is rendered as without it")
+    base = shader.inputs["Base Color"]
+    if not base.is_linked and max(base.default_value[:3]) > 1:
+        lost.add(name, "base color over 1", "it is cut off at 1; give it a color that reflects no more than it gets")
     tint, metal = shader.inputs["Specular Tint"], shader.inputs["Metallic"]
     if (metal.is_linked or metal.default_value > 0) and (tint.is_linked or min(tint.default_value) < 1):
         lost.add(name, "specular tint of a metal", "its rim is white; tint the base color instead")

@@ -172,4 +172,5 @@ def test_what_principled_has_beyond_gltf_is_named(blender, surface, export):
     labels = {"Diffuse Roughness": "diffuse roughness", "Subsurface Weight": "subsurface scattering", "Thin Film Thickness": "thin film"}
     assert export().lost_features("Grey") == [labels[name] for name in there]
     surface.inputs["Metallic"].default_value = 1.0
-    assert export().lost_features("Grey") == [*(labels[name] for name in there), "specular tint of a metal"]
+    surface.inputs["Base Color"].default_value = (1.5, 0.5, 0.5, 1)
+    assert export().lost_features("Grey") == [*(labels[name] for name in there), "base color over 1", "specular tint of a metal"]

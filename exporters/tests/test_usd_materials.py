@@ -315,3 +315,12 @@ def test_materialx_numbers_are_those_gltf_may_have(usd_convert):
     shader.CreateIdAttr("ND_standard_surface_surfaceshader")
     shader.CreateInput("specular_roughness", Sdf.ValueTypeNames.Float).Set(1.5)
     assert usd_convert(made).root["materials"][0]["pbrMetallicRoughness"]["roughnessFactor"] == 1
+
+
+def test_colours_over_one_are_named(usd_convert):
+    made = u.stage()
+    u.camera(made)
+    u.bind(u.quad(made, "/World/Card"), u.preview(made, "/World/M", diffuseColor=(1.5, 0.5, 0.5)))
+    gltf = usd_convert(made)
+    assert gltf.root["materials"][0]["pbrMetallicRoughness"]["baseColorFactor"] == [1, 0.5, 0.5, 1]
+    assert gltf.lost_features("/World/M") == ["diffuseColor over 1"]

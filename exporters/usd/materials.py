@@ -133,6 +133,8 @@ class Materials:
             factor[:3], channel = _factored(colour.channel, highest=1)
         else:
             factor[:3] = [tidy(min(max(c, 0), 1)) for c in colour]
+            if max(colour) > 1:
+                self.lost.add(path, "diffuseColor over 1", "it is cut off at 1; give it a colour that reflects no more than it gets")
         if not isinstance(opacity, Reader):
             factor[3] = tidy(min(max(opacity, 0), 1))
         texture, reader = None, colour
