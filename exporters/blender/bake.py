@@ -12,7 +12,7 @@ import bpy
 import numpy as np
 
 from ..common.srgb import encoded
-from .materials import DEFORMED, PLACED, make_plain, output_of
+from .materials import CUT_OFF, DEFORMED, PLACED, make_plain, output_of
 from .nodes import PAIRS, is_generated, placed, unreadable_inputs
 
 _UV = "buzz-bake"
@@ -115,8 +115,8 @@ def _bake_input(scene: bpy.types.Scene, ob: bpy.types.Object, slot: bpy.types.Ma
     output = output_of(tree)
     socket = shader.inputs[name]
     texture = tree.nodes.new("ShaderNodeTexImage")
-    # An emission may be brighter than an image can hold.
-    texture.image = bpy.data.images.new(f"{material.name}-{name.replace(' ', '')}", size, size, alpha=False, float_buffer=name == "Emission Color")
+    # Colours may be brighter than an image can hold.
+    texture.image = bpy.data.images.new(f"{material.name}-{name.replace(' ', '')}", size, size, alpha=False, float_buffer=name in _COLOURS)
     if name in _VALUES:
         texture.image.colorspace_settings.name = "Non-Color"
     uv = tree.nodes.new("ShaderNodeUVMap")
@@ -135,8 +135,13 @@ def _bake_input(scene: bpy.types.Scene, ob: bpy.types.Object, slot: bpy.types.Ma
     _bake(scene, ob, slot)
     tree.nodes.remove(emission)
     tree.links.new(shader.outputs[0], output.inputs["Surface"])
-    if name == "Emission Color":
-        texture.image, shader.inputs["Emission Strength"].default_value = _within_one(texture.image)
+    if name in _COLOURS:
+        brightest = _brightest(texture.image)
+        if name == "Emission Color":
+            shader.inputs["Emission Strength"].default_value = brightest
+        elif brightest > 1.01:
+            texture[CUT_OFF] = True
+        texture.image = _encoded(texture.image, brightest if name == "Emission Color" else 1.0)
     texture.image.pack()
     if name in _VALUES:
         split = tree.nodes.new("ShaderNodeSeparateColor")
@@ -178,14 +183,21 @@ def _bake(scene: bpy.types.Scene, ob: bpy.types.Object, slot: bpy.types.Material
         nodes.active = active
 
 
-def _within_one(bright: bpy.types.Image) -> tuple[bpy.types.Image, float]:
-    """An image of what glTF's 8 bits hold, and the factor that brings it back."""
-    pixels = np.empty(len(bright.pixels), dtype=np.float32)
-    bright.pixels.foreach_get(pixels)
-    pixels = pixels.reshape(-1, bright.channels)
-    colours = np.clip(pixels[:, :3], 0.0, None)
-    factor = float(colours.max()) or 1.0
-    pixels[:, :3] = encoded(colours / factor)
-    image = bpy.data.images.new(bright.name, *bright.size, alpha=False)
+def _brightest(deep: bpy.types.Image) -> float:
+    """The highest value of a colour in an image; 1 if all is black."""
+    return max(float(_pixels(deep)[:, :3].max()), 0.0) or 1.0
+
+
+def _encoded(deep: bpy.types.Image, factor: float) -> bpy.types.Image:
+    """An image of 8 bits, as glTF has them, that holds the colours of a deep one divided by a factor."""
+    pixels = _pixels(deep)
+    pixels[:, :3] = encoded(np.clip(pixels[:, :3] / factor, 0.0, 1.0))
+    image = bpy.data.images.new(deep.name, *deep.size, alpha=False)
     image.pixels.foreach_set(pixels.reshape(-1))
-    return image, factor
+    return image
+
+
+def _pixels(image: bpy.types.Image) -> np.ndarray:
+    pixels = np.empty(len(image.pixels), dtype=np.float32)
+    image.pixels.foreach_get(pixels)
+    return pixels.reshape(-1, image.channels)

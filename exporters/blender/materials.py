@@ -22,6 +22,8 @@ from .prepare import is_animated
 PLACED = "placed"
 # The property of a mesh that is bent out of its first form, and of the node of an image that depends on what that was.
 DEFORMED = "deformed"
+# The property of a baked image's node that was brighter than the image can be.
+CUT_OFF = "cut off"
 _DROPPED = {"Diffuse Roughness": "diffuse roughness", "Subsurface Weight": "subsurface scattering", "Thin Film Thickness": "thin film"}
 
 
@@ -195,7 +197,7 @@ def _name_losses(shader: bpy.types.Node, meshes: list[bpy.types.Mesh], name: str
         if value is not None and (value.is_linked or value.default_value > 0):
             lost.add(name, label, "it is rendered as without it")
     base = shader.inputs["Base Color"]
-    if not base.is_linked and max(base.default_value[:3]) > 1:
+    if any(CUT_OFF in out.node for out in upstream(base)) or (not base.is_linked and max(base.default_value[:3]) > 1):
         lost.add(name, "base color over 1", "it is cut off at 1; give it a color that reflects no more than it gets")
     tint, metal = shader.inputs["Specular Tint"], shader.inputs["Metallic"]
     if (metal.is_linked or metal.default_value > 0) and (tint.is_linked or min(tint.default_value) < 1):

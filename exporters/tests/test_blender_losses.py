@@ -174,3 +174,13 @@ def test_what_principled_has_beyond_gltf_is_named(blender, surface, export):
     surface.inputs["Metallic"].default_value = 1.0
     surface.inputs["Base Color"].default_value = (1.5, 0.5, 0.5, 1)
     assert export().lost_features("Grey") == [*(labels[name] for name in there), "base color over 1", "specular tint of a metal"]
+
+
+@pytest.mark.parametrize(("bright", "lost"), [(0.0, []), (0.5, ["base color over 1"])])
+def test_colours_that_are_baked_are_named_where_they_are_cut_off(blender, surface, export, bright, lost):
+    tree = surface.id_data
+    noise, change = tree.nodes.new("ShaderNodeTexNoise"), tree.nodes.new("ShaderNodeBrightContrast")
+    change.inputs["Bright"].default_value = bright
+    tree.links.new(noise.outputs["Color"], change.inputs["Color"])
+    tree.links.new(change.outputs["Color"], surface.inputs["Base Color"])
+    assert export(bake=16).lost_features("Grey") == lost
