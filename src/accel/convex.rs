@@ -12,7 +12,7 @@ pub(super) const ROUNDING: f32 = 4.0 * f32::EPSILON;
 
 /// Corners of a triangle cut by the planes of any space, each of which adds one at most. If rounding adds more they are left out: some are
 /// left.
-pub(super) const MOST_CORNERS: usize = 3 + 6;
+pub(super) const MOST_CUT_CORNERS: usize = 3 + 6;
 
 /// Where no plane's normal points away, in the space of a tree.
 pub(super) struct Convex<const PLANES: usize> {
@@ -35,7 +35,7 @@ struct Slabs<const PLANES: usize> {
 
 /// The outline of a part of a triangle, from the eye.
 pub(super) struct Outline {
-    corners: [Vec3A; MOST_CORNERS],
+    corners: [Vec3A; MOST_CUT_CORNERS],
     count: usize,
 }
 
@@ -98,14 +98,14 @@ impl<const PLANES: usize> Convex<PLANES> {
 
     /// What is inside of a triangle with those corners from the eye.
     pub fn cut(&self, triangle: [Vec3A; 3], rounding: f32) -> Outline {
-        let mut outline = Outline { corners: [Vec3A::ZERO; MOST_CORNERS], count: 3 };
+        let mut outline = Outline { corners: [Vec3A::ZERO; MOST_CUT_CORNERS], count: 3 };
         outline.corners[..3].copy_from_slice(&triangle);
         // Sutherland and Hodgman: Reentrant Polygon Clipping (1974).
         for (normal, distance) in self.normals.iter().zip(self.distances) {
             let Outline { corners: uncut, count: uncut_count } = outline;
             outline.count = 0;
             let mut keep = |corner| {
-                if outline.count < MOST_CORNERS {
+                if outline.count < MOST_CUT_CORNERS {
                     outline.corners[outline.count] = corner;
                     outline.count += 1;
                 }

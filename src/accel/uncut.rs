@@ -1,6 +1,6 @@
 //! What the near or far plane of one view cut off, and another view sees.
 
-use super::convex::{Convex, MOST_CORNERS, ROUNDING};
+use super::convex::{Convex, MOST_CUT_CORNERS, ROUNDING};
 use super::{Accel, Placed};
 use crate::scene::{Scene, Shape, View};
 use glam::{Affine3A, DMat3, DVec3, Mat3, Vec3, Vec3A};
@@ -143,7 +143,7 @@ impl Convex<PLANES> {
         visit: &(dyn Fn(&[Vec3]) + Sync),
     ) {
         let outline = self.cut(triangle, rounding);
-        let mut points = [Vec3::ZERO; MOST_CORNERS];
+        let mut points = [Vec3::ZERO; MOST_CUT_CORNERS];
         for (point, &corner) in points.iter_mut().zip(outline.corners()) {
             *point = render_from_object.transform_point3a(corner + self.eye).into();
         }

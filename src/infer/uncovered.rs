@@ -16,12 +16,12 @@ use glam::{DVec4, Vec3};
 pub fn uncovered(outline: &[Vec3], view: &Projector, landings: &Landings, marks: &Marks) {
     // A floor may begin under the eye and end at the horizon: in single precision its near part would be lost.
     let raster_from_world = view.raster_from_world().as_dmat4();
-    let (mut corners, count) = ([DVec4::ZERO; MOST_CORNERS], outline.len().min(MOST_CORNERS));
+    let (mut corners, count) = ([DVec4::ZERO; MOST_OUTLINE_CORNERS], outline.len().min(MOST_OUTLINE_CORNERS));
     corners.iter_mut().zip(outline).for_each(|(c, p)| *c = raster_from_world * p.as_dvec3().extend(1.0));
     let (corners, count) = before_the_eye(&corners[..count], view.near().into(), view.is_perspective());
     let corners = &corners[..count];
     let Some(nearest) = corners.iter().map(|c| c.z).reduce(f64::min) else { return };
-    let mut outline = [(0.0, 0.0); MOST_CORNERS + 1];
+    let mut outline = [(0.0, 0.0); MOST_OUTLINE_CORNERS + 1];
     outline.iter_mut().zip(corners).for_each(|(place, c)| *place = (c.x / c.w, c.y / c.w));
     let (width, height) = view.size();
     for_each_centre(&outline[..count], (width.into(), height.into()), |x, y| {
@@ -34,17 +34,21 @@ pub fn uncovered(outline: &[Vec3], view: &Projector, landings: &Landings, marks:
 }
 
 /// Corners of an outline, at most: a triangle's that six planes have cut.
-const MOST_CORNERS: usize = 9;
+const MOST_OUTLINE_CORNERS: usize = 9;
 
 /// What is nearer to the plane of a perspective eye than this share of the farthest corner's depth is cut off with what is before
 /// the near plane: it lies far outside the image, and division by its depth would leave no digit.
 const NEAREST: f64 = 1e-9;
 
 /// The part of an outline beyond the near plane, in homogeneous raster coordinates: so many corners.
-fn before_the_eye(outline: &[DVec4], near: f64, perspective: bool) -> ([DVec4; MOST_CORNERS + 1], usize) {
+fn before_the_eye(
+    outline: &[DVec4],
+    near: f64,
+    perspective: bool,
+) -> ([DVec4; MOST_OUTLINE_CORNERS + 1], usize) {
     let farthest = outline.iter().map(|c| c.z).fold(0.0, f64::max);
     let near = if perspective { near.max(NEAREST * farthest) } else { near };
-    let (mut kept, mut count) = ([DVec4::ZERO; MOST_CORNERS + 1], 0);
+    let (mut kept, mut count) = ([DVec4::ZERO; MOST_OUTLINE_CORNERS + 1], 0);
     // Of what rounding has made less than convex some corners may be left out.
     let mut keep = |corner| {
         if let Some(place) = kept.get_mut(count) {

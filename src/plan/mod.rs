@@ -158,7 +158,7 @@ pub fn plan(path: &[PathFrame], cuts: &[i64], options: PlanOptions) -> Plan {
     let others = longest as usize - 1;
     let survey = Survey::of(path, cuts, options.quality, |_| [others / 2, others - others / 2]);
     let mut plan = Plan { cuts: survey.cuts.clone(), ..Plan::default() };
-    for segments::Share { ranges, cost } in divide(&survey.chains, options.workers) {
+    for segments::Workload { ranges, cost } in divide(&survey.chains, options.workers) {
         for &range in &ranges {
             survey.add(&mut plan, range, survey.reason(range.first, full, longest));
         }

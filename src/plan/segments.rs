@@ -184,17 +184,17 @@ impl Division {
     }
 
     /// The shares of all frames; none if no share may cost so little.
-    fn shares(&self) -> Option<Vec<Share>> {
+    fn shares(&self) -> Option<Vec<Workload>> {
         let mut end = self.best.len() - 1;
         let mut found = Vec::new();
-        let mut share = Share { ranges: Vec::new(), cost: self.best[end]?.cost };
+        let mut share = Workload { ranges: Vec::new(), cost: self.best[end]?.cost };
         while end > 0 {
             let best = self.best[end]?;
             share.ranges.insert(0, best.last);
             end = best.last.first;
             if best.opens {
                 let cost = self.best[end]?.cost;
-                found.push(std::mem::replace(&mut share, Share { ranges: Vec::new(), cost }));
+                found.push(std::mem::replace(&mut share, Workload { ranges: Vec::new(), cost }));
             }
         }
         found.reverse();
@@ -204,7 +204,7 @@ impl Division {
 
 /// Consecutive segments that one worker renders, and their predicted cost in frames traced in full.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Share {
+pub struct Workload {
     /// The segments.
     pub ranges: Vec<Range>,
     /// What they cost.
@@ -219,8 +219,8 @@ const SHARE_PRECISION: f64 = 0.01;
 ///
 /// A share may end within what would be one segment: the next one then pays for a key frame of its own, and both are
 /// done sooner. What the dearest must cost is found by bisection.
-pub fn divide(chains: &[Chain], workers: usize) -> Vec<Share> {
-    let dearest = |shares: &[Share]| shares.iter().map(|s| s.cost).fold(0.0, f64::max);
+pub fn divide(chains: &[Chain], workers: usize) -> Vec<Workload> {
+    let dearest = |shares: &[Workload]| shares.iter().map(|s| s.cost).fold(0.0, f64::max);
     let mut best = Division::of(chains, f64::INFINITY).shares().unwrap_or_default();
     let mut enough = dearest(&best);
     let mut too_little = enough / workers as f64 - SHARE_PRECISION;

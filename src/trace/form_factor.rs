@@ -32,8 +32,8 @@ pub(super) fn disc_shares(cosines: Vec4, sines: Vec4) -> Vec4 {
     cut.replace(cosines.max(Vec4::ZERO), |lane| disc_share(cosines[lane], sines[lane]))
 }
 
-/// Corners that a polygon may have.
-pub(super) const MOST_CORNERS: usize = 16;
+/// Corners of a panel's polygon, at most.
+pub(super) const MOST_PANEL_CORNERS: usize = 16;
 
 /// The integral over a convex polygon, its corners relative to the point.
 ///
@@ -41,7 +41,7 @@ pub(super) const MOST_CORNERS: usize = 16;
 /// plane through it.
 pub(super) fn polygon(corners: impl Iterator<Item = DVec3> + Clone, normal: DVec3) -> f64 {
     // The part above the horizon has at most one corner more.
-    let mut above = [DVec3::ZERO; MOST_CORNERS + 1];
+    let mut above = [DVec3::ZERO; MOST_PANEL_CORNERS + 1];
     let mut count = 0;
     let mut add = |corner: DVec3| {
         if count < above.len() {

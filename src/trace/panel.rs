@@ -1,6 +1,6 @@
 //! Area lights: flat, and shining from one side as a diffuse surface does.
 
-use super::form_factor::{MOST_CORNERS, polygon};
+use super::form_factor::{MOST_PANEL_CORNERS, polygon};
 use super::lanes::{LANES, Vec3x4, angles};
 use super::light::MIN_DISTANCE;
 use super::parts::Middles;
@@ -27,31 +27,31 @@ pub(super) struct Panel {
     pub area: f32,
     outline: Outline,
     /// Around the middle; those of a polygon of the same area for an ellipse.
-    corners: [DVec3; MOST_CORNERS],
+    corners: [DVec3; MOST_PANEL_CORNERS],
     corner_count: usize,
     /// The same corners, and the edges from them to the next ones, four at a time.
-    edges: [[Vec3x4; 2]; MOST_CORNERS / LANES],
+    edges: [[Vec3x4; 2]; MOST_PANEL_CORNERS / LANES],
 }
 
 impl Panel {
     pub fn new(light: &PosedLight, middle: Vec3, outline: Outline, size: Vec2) -> Self {
         let right = light.right * f64::from(size.x) / 2.0;
         let up = light.right.cross(light.direction) * f64::from(size.y) / 2.0;
-        let mut corners = [DVec3::ZERO; MOST_CORNERS];
+        let mut corners = [DVec3::ZERO; MOST_PANEL_CORNERS];
         let (corner_count, area) = match outline {
             Outline::Rectangle => {
                 corners[..4].copy_from_slice(&[right + up, up - right, -right - up, right - up]);
                 (4, size.x * size.y)
             }
             Outline::Ellipse => {
-                let step = std::f64::consts::TAU / MOST_CORNERS as f64;
+                let step = std::f64::consts::TAU / MOST_PANEL_CORNERS as f64;
                 // A polygon inside a circle has less than its area.
                 let reach = (step / step.sin()).sqrt();
                 for (i, corner) in corners.iter_mut().enumerate() {
                     let (sin, cos) = (step * i as f64).sin_cos();
                     *corner = (right * cos + up * sin) * reach;
                 }
-                (MOST_CORNERS, size.x * size.y * PI / 4.0)
+                (MOST_PANEL_CORNERS, size.x * size.y * PI / 4.0)
             }
         };
         let edges = std::array::from_fn(|group| {
