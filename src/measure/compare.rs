@@ -1,10 +1,11 @@
 //! One sequence against another, frame by frame.
 
+use super::sequences::{Sequences, sequences_in};
 use super::{
     Exposure, ImageError, Percentile, Place, ReadFrame, compare_pictures, picture, read_frame, worst_place,
 };
 use crate::frame::FrameKind;
-use crate::output::{is_anothers, number_in_name};
+use crate::output::is_anothers;
 use crate::{Error, Result};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
@@ -78,7 +79,7 @@ pub const ENHANCED: f32 = 4.0;
 /// [`Error::Input`] if a folder or file cannot be read, if no frame has a counterpart, or if a pair's data windows differ;
 /// [`Error::Output`] if a picture cannot be written, or would replace one that is not of this program.
 pub fn compare(sequence: &Path, reference: &Path, pictures: Option<&Path>) -> Result<Comparison> {
-    let (own, others) = (list(sequence)?, list(reference)?);
+    let [own, others] = sequences_in([sequence, reference])?;
     let names = [&own, &others].map(|of| of.keys().take(4).cloned().collect::<Vec<_>>().join(", "));
     let (pairs, references, unmatched) = pair_up(own, others);
     if pairs.is_empty() {
@@ -217,26 +218,6 @@ impl MeanError {
 /// The name of a file in its folder.
 fn file_name(path: impl AsRef<Path>) -> String {
     path.as_ref().file_name().unwrap_or_default().to_string_lossy().into_owned()
-}
-
-/// By the name with # for its number, then by number.
-type Sequences = BTreeMap<String, BTreeMap<i64, PathBuf>>;
-
-/// The EXR files of a folder; what is hidden (such as a run's temporary files), has no number or is no file is left out.
-fn list(folder: &Path) -> Result<Sequences> {
-    let fail = |e: std::io::Error| Error::input(folder, "folder", e.to_string());
-    let mut sequences = Sequences::new();
-    for entry in std::fs::read_dir(folder).map_err(fail)? {
-        let path = entry.map_err(fail)?.path();
-        let Some(name) = path.file_name().and_then(|n| n.to_str()) else { continue };
-        if !path.is_file() || name.starts_with('.') || !name.to_ascii_lowercase().ends_with(".exr") {
-            continue;
-        }
-        if let Some((before, number, after)) = number_in_name(name) {
-            sequences.entry(format!("{before}#{after}")).or_default().insert(number, path);
-        }
-    }
-    Ok(sequences)
 }
 
 /// Pairs frames; two folders with one sequence each are paired whatever the names. Also all files of the reference sequences of

@@ -10,6 +10,7 @@ mod flip;
 pub mod picture;
 mod place;
 mod read;
+mod sequences;
 pub mod trade;
 
 pub use compare::{Comparison, ENHANCED, FrameError, MeanError, Unmatched, compare};

@@ -1,6 +1,7 @@
 //! Frames back from EXR files, ours or another renderer's.
 
 use crate::frame::FrameKind;
+use crate::output::exr::{FRAME, FRAME_KIND, INFERRED_FROM};
 use crate::{Error, Result};
 use exr::meta::MetaData;
 use exr::meta::attribute::{AttributeValue, Text};
@@ -105,8 +106,16 @@ fn color_prefix(names: &[String]) -> Option<&str> {
     plain.or_else(|| prefixes().find(|p| p.ends_with("Combined."))).or_else(|| prefixes().next())
 }
 
+/// The frame number that a file states, if it does.
+pub(super) fn stated_number(path: &Path) -> Option<i64> {
+    let meta = MetaData::read_from_file(path, false).ok()?;
+    match meta.headers.first()?.own_attributes.other.get(&Text::from(FRAME))? {
+        AttributeValue::I32(number) => Some((*number).into()),
+        _ => None,
+    }
+}
+
 fn kind_of(header: &exr::meta::header::Header) -> Option<FrameKind> {
-    use crate::output::exr::{FRAME_KIND, INFERRED_FROM};
     let other = &header.own_attributes.other;
     match other.get(&Text::from(FRAME_KIND))? {
         AttributeValue::Text(kind) if kind.eq("traced") => Some(FrameKind::Traced),

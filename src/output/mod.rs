@@ -25,7 +25,7 @@ pub use folder::OutputFolder;
 pub use hash::{SettingsHash, SettingsHasher};
 pub use lock::FrameLock;
 pub use memory::{MemorySink, NullSink};
-pub use naming::{NamePattern, number_in_name};
+pub use naming::{NamePattern, NumberInName, number_in_name, numbers_in_name};
 pub use peak::{most_bytes, peak_bytes};
 pub use report::{
     FrameRecord, FrameReport, IgnoredFeature, KeyFrame, Plan, Report, ReportInput, SceneSummary,

@@ -110,19 +110,33 @@ fn percent(text: &str) -> Option<(usize, &str)> {
     Some((width, after.strip_prefix('d')?))
 }
 
-/// The frame number in a file's name, between what stands before and after it: the last run of digits before its ending; a
-/// hyphen before it is a minus sign unless it joins the number to a word (`walk-001.exr` is 1, `walk.-001.exr` is -1).
-pub fn number_in_name(name: &str) -> Option<(&str, i64, &str)> {
-    let stem = name.rsplit_once('.').map_or(name, |(stem, _)| stem);
-    let end = stem.rfind(|c: char| c.is_ascii_digit())? + 1;
-    let start = stem[..end]
-        .rfind(|c: char| !c.is_ascii_digit())
-        .map_or(0, |i| i + stem[i..].chars().next().map_or(1, char::len_utf8));
-    let number: i64 = stem[start..end].parse().ok()?;
-    let before = stem[..start].strip_suffix('-');
-    let minus = before.filter(|b| !b.ends_with(char::is_alphanumeric));
-    let (before, number) = minus.map_or((&stem[..start], number), |before| (before, -number));
-    Some((before, number, &name[end..]))
+/// A number in a file's name, between what stands before it and after it.
+pub type NumberInName<'a> = (&'a str, i64, &'a str);
+
+/// The frame number in a file's name: the last run of digits before its ending; a hyphen before it is a minus sign unless it
+/// joins the number to a word (`walk-001.exr` is 1, `walk.-001.exr` is -1).
+pub fn number_in_name(name: &str) -> Option<NumberInName<'_>> {
+    let numbers = numbers_in_name(name);
+    let &(before, number, after) = numbers.first()?;
+    let negative =
+        numbers.get(1).filter(|second| second.2 == after && !second.0.ends_with(char::is_alphanumeric));
+    Some(negative.copied().unwrap_or((before, number, after)))
+}
+
+/// All that may be a number in a file's name, before its ending: the last run of digits first, and each twice if a hyphen
+/// stands before it, which may be a minus sign.
+pub fn numbers_in_name(name: &str) -> Vec<NumberInName<'_>> {
+    let mut found = Vec::new();
+    let mut rest = name.rsplit_once('.').map_or(name, |(stem, _)| stem);
+    while let Some(last) = rest.rfind(|c: char| c.is_ascii_digit()) {
+        let (digits, after) = (&rest[..=last], &name[last + 1..]);
+        rest = digits.trim_end_matches(|c: char| c.is_ascii_digit());
+        if let Ok(number) = digits[rest.len()..].parse::<i64>() {
+            found.push((rest, number, after));
+            found.extend(rest.strip_suffix('-').map(|before| (before, -number, after)));
+        }
+    }
+    found
 }
 
 #[cfg(test)]

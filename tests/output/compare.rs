@@ -135,6 +135,23 @@ fn several_sequences_in_a_folder_are_kept_apart() {
 }
 
 #[test]
+fn frames_are_known_by_the_numbers_that_they_state() {
+    for (pattern, names) in [
+        ("s.%04d_v2.exr", ["s.-001_v2.exr", "s.0002_v2.exr"]),
+        ("walk%04d.exr", ["walk-001.exr", "walk0002.exr"]),
+    ] {
+        let folder = tempfile::tempdir().unwrap();
+        let (a, b) = (folder.path().join("a"), folder.path().join("b"));
+        for (name, number) in names.into_iter().zip([-1, 2]) {
+            write(&a, name, &plain(number, FrameKind::Traced));
+            write(&b, &format!("other.{number:04}.exr"), &plain(number, FrameKind::Traced));
+        }
+        let frames = compare(&a, &b, None).unwrap().frames;
+        assert_eq!(frames.iter().map(|f| f.frame).collect::<Vec<_>>(), [-1, 2], "{pattern}");
+    }
+}
+
+#[test]
 fn shots_with_numbers_in_their_names_are_kept_apart() {
     let folder = tempfile::tempdir().unwrap();
     let (a, b) = (folder.path().join("a"), folder.path().join("b"));
