@@ -150,6 +150,19 @@ mod tests {
     }
 
     #[test]
+    fn that_nuke_cannot_read_a_name_is_said_in_the_script() {
+        let frames: BTreeSet<i64> = (1..=3).collect();
+        let said = |stem: &str, base: &str| {
+            let names = NamePattern::parse("<stem>.####.exr", stem).unwrap();
+            of(Path::new(""), &names, &frames).nuke_script(base, 1, 3).contains("label \"Nuke takes #")
+        };
+        assert_eq!(
+            (said("shot", "../"), said("sh#1", "../"), said("shot", "/shots/#1/")),
+            (false, true, true)
+        );
+    }
+
+    #[test]
     fn everything_is_written_beside_the_report_and_refers_to_the_frames() {
         let folder = tempfile::tempdir().unwrap();
         let frames: BTreeSet<i64> = (1..=3).collect();

@@ -13,12 +13,19 @@ impl Review<'_> {
             quoted(base)
         };
         let file = format!("{folder}{}%0{digits}d{}", quoted(prefix), quoted(suffix));
+        // There is no way to quote it.
+        let label = match file.contains('#') {
+            true => {
+                " label \"Nuke takes # for the frame's number: rename the folders or frames (--name) that have one\"\n"
+            }
+            false => "",
+        };
         let (width, height, aspect, fps) = (self.width, self.height, self.pixel_aspect, self.fps.value());
         let mut script = format!(
             "Root {{\n inputs 0\n first_frame {first}\n last_frame {last}\n fps {fps}\n \
              format \"{width} {height} 0 0 {width} {height} {aspect} Buzz\"\n}}\n\
              Read {{\n inputs 0\n file \"{file}\"\n first {first}\n last {last}\n origfirst {first}\n origlast {last}\n \
-             origset true\n name Beauty\n xpos 0\n ypos 0\n}}\n"
+             origset true\n name Beauty\n{label} xpos 0\n ypos 0\n}}\n"
         );
         if self.has_class {
             let [red, green, blue] = [0, 1, 2].map(expression);
