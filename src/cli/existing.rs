@@ -7,7 +7,9 @@ use super::say;
 use anyhow::Result;
 use buzz::error::Error;
 use buzz::frame::FrameId;
-use buzz::output::{FrameFile, FrameRecord, OutputFolder, Report, Review, SettingsHash, is_anothers};
+use buzz::output::{
+    FrameFile, FrameRecord, OutputFolder, Report, Review, SettingsHash, is_anothers, is_too_long,
+};
 use buzz::sequence::{Observer, Settings};
 use rayon::prelude::*;
 use std::collections::BTreeSet;
@@ -113,8 +115,12 @@ pub fn prepare_files(files: &[PathBuf], advice: &str) -> Result<()> {
             let message = format!("is a folder, where a file is to be written; move it away, or {advice}");
             return Err(Error::output(file, message).into());
         }
-        let (folder, _) = place_of(file);
+        let (folder, name) = place_of(file);
         let there = folder.ancestors().find(|path| path.exists()).unwrap_or(Path::new("."));
+        if is_too_long(there, &name) {
+            let message = format!("its name is too long for this file system; {advice}");
+            return Err(Error::output(file, message).into());
+        }
         if probed.insert(there) {
             tempfile::tempfile_in(there)
                 .map_err(|e| Error::output(file, format!("it cannot be written there ({e}); {advice}")))?;

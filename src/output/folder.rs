@@ -1,9 +1,9 @@
 //! The output folder of a run: made, locked for the run's frames, and cleared of what a killed run left.
 
-use super::write::{explain, remove_leftovers};
+use super::write::{explain, is_too_long, remove_leftovers};
 use super::{FrameFile, FrameLock, NamePattern, SettingsHash};
-use crate::Result;
 use crate::frame::FrameId;
+use crate::{Error, Result};
 use std::path::{Path, PathBuf};
 
 /// A folder in which this run alone may write its frames, until this is dropped.
@@ -41,10 +41,16 @@ impl OutputFolder {
     /// of them.
     ///
     /// # Errors
-    /// [`crate::Error::Output`] if the folder cannot be made or written, or another run is writing one of the frames.
+    /// [`Error::Output`] if the folder cannot be made or written, if a name is too long, or if another run is writing one of the
+    /// frames.
     pub fn open(path: &Path, names: NamePattern, frames: impl IntoIterator<Item = FrameId>) -> Result<Self> {
         let made = Made::make(path)?;
         let files: Vec<String> = frames.into_iter().map(|id| names.file_of(id)).collect();
+        let longest = files.iter().max_by_key(|name| name.len());
+        if let Some(long) = longest.filter(|name| is_too_long(path, name)) {
+            let message = "its name is too long for this file system; give a shorter --name";
+            return Err(Error::output(path.join(long), message));
+        }
         let lock = FrameLock::acquire(path, &files)?;
         remove_leftovers(path, &files.into_iter().collect())?;
         Ok(Self { path: path.to_path_buf(), names, lock, _made: made })

@@ -37,4 +37,4 @@ pub use runs::{Run, RunSeconds, earlier_runs};
 pub use sink::ExrSink;
 pub use temporary::remove_temporary_files;
 pub use thumbnails::{Thumbnail, Thumbnails, WithThumbnails};
-pub use write::{is_anothers, write_alone};
+pub use write::{is_anothers, is_too_long, write_alone};

@@ -27,6 +27,12 @@ pub fn write_alone(path: &Path, bytes: &[u8]) -> Result<()> {
     write_whole(path, [bytes])
 }
 
+/// True if a file of this name in `folder` could not have the longer name that it has while it is written. Makes nothing.
+pub fn is_too_long(folder: &Path, name: &str) -> bool {
+    let temporary = folder.join(format!("{}xxxxxx{SUFFIX}", prefix(name)));
+    fs::symlink_metadata(temporary).is_err_and(|e| e.kind() == io::ErrorKind::InvalidFilename)
+}
+
 /// True if `file` is anything but empty or a file that has our `mark` in it, whatever else that is.
 pub fn is_anothers(file: &Path, mark: &str) -> bool {
     let Ok(found) = fs::metadata(file) else { return false };
@@ -38,7 +44,7 @@ pub fn is_anothers(file: &Path, mark: &str) -> bool {
 
 fn write_and_rename<'a>(path: &Path, parts: impl IntoIterator<Item = &'a [u8]>) -> io::Result<()> {
     let name = path.file_name().unwrap_or_default().to_string_lossy();
-    let mut temporary = Temporary::new(folder_of(path), &format!(".{name}."), ".tmp")?;
+    let mut temporary = Temporary::new(folder_of(path), &prefix(&name), SUFFIX)?;
     let file = temporary.file();
     // So that no other run takes it for what a killed one left; where there are no locks, it has to do without.
     let _ = file.try_lock();
@@ -49,6 +55,14 @@ fn write_and_rename<'a>(path: &Path, parts: impl IntoIterator<Item = &'a [u8]>) 
     file.sync_all()?;
     temporary.rename(path)
 }
+
+/// What the temporary name of a file begins with; letters drawn by chance follow.
+fn prefix(name: &str) -> String {
+    format!(".{name}.")
+}
+
+/// What temporary names end with.
+const SUFFIX: &str = ".tmp";
 
 /// The folder that a file is in.
 pub(super) fn folder_of(path: &Path) -> &Path {
@@ -80,7 +94,7 @@ pub(super) fn open_to_lock(path: &Path) -> io::Result<File> {
 
 /// The file for which `name` is a temporary name.
 fn temporary_of(name: &str) -> Option<&str> {
-    let (name, letters) = name.strip_prefix('.')?.strip_suffix(".tmp")?.rsplit_once('.')?;
+    let (name, letters) = name.strip_prefix('.')?.strip_suffix(SUFFIX)?.rsplit_once('.')?;
     (!letters.is_empty() && letters.bytes().all(|b| b.is_ascii_alphanumeric())).then_some(name)
 }
 

@@ -137,6 +137,20 @@ fn output_that_cannot_be_written_is_refused_with_4() {
     assert_eq!(listing(&out), ["s.0001.exr"], "it was found out before the rendering");
 }
 
+#[cfg(unix)]
+#[test]
+fn names_that_are_too_long_are_refused_before_the_rendering() {
+    let (folder, out) = fresh();
+    let scene = Stage::drifting(2).write(&folder.path().join("s.gltf"));
+    // File names have 255 bytes at most, and while a file is written its own is longer.
+    let long = "l".repeat(240);
+    run(&scene, &out, &format!("-r 8x8 --name {long}.%04d.exr")).refused(4, &["too long", "--name"]);
+    let report = folder.path().join(format!("new/{long}x.json"));
+    run(&scene, &out, &format!("-r 8x8 --report {}", report.display())).refused(4, &["too long", "--report"]);
+    assert!(!out.exists());
+    run(&scene, &out, &format!("-r 8x8 --name {}.%d.exr", "l".repeat(237))).ok();
+}
+
 #[test]
 fn a_picture_of_the_scenes_is_not_replaced_by_a_frame() {
     let (folder, _) = fresh();
