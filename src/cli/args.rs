@@ -158,6 +158,12 @@ pub struct RenderArgs {
     /// Image size: 1920x1080, or a share of the scene's own: 50% [default: the scene's, else 1280x720].
     #[arg(short, long)]
     pub resolution: Option<String>,
+    /// Shadow rays to each light that has a size; a single one goes to its middle.
+    #[arg(long, value_name = "N", default_value_t = 1, allow_negative_numbers = true, value_parser = clap::value_parser!(u32).range(1..=4096))]
+    pub light_samples: u32,
+    /// Rays a point to the world, for ambient occlusion; without any the world shines through everything.
+    #[arg(long, value_name = "N", default_value_t = 0, allow_negative_numbers = true, value_parser = clap::value_parser!(u32).range(..=4096))]
+    pub ambient_samples: u32,
     /// Longest segment in frames, or auto.
     #[arg(long, default_value = "auto")]
     pub segment: String,
@@ -186,12 +192,6 @@ pub struct OutputArgs {
     /// Levels of super-sampling: 1 is one sample a pixel, 2 and 3 take up to 3x3 and 5x5 where neighbours differ.
     #[arg(long, value_name = "LEVELS", default_value_t = 1, allow_negative_numbers = true, value_parser = clap::value_parser!(u32).range(1..=i64::from(Settings::MOST_LEVELS)))]
     pub aa: u32,
-    /// Shadow rays to each light that has a size; a single one goes to its middle.
-    #[arg(long, value_name = "N", default_value_t = 1, allow_negative_numbers = true, value_parser = clap::value_parser!(u32).range(1..=4096))]
-    pub light_samples: u32,
-    /// Rays a point to the world, for ambient occlusion; without any the world shines through everything.
-    #[arg(long, value_name = "N", default_value_t = 0, allow_negative_numbers = true, value_parser = clap::value_parser!(u32).range(..=4096))]
-    pub ambient_samples: u32,
     /// Render a pair of eyes so far apart, metres, about each camera: a file for the left and one for the right.
     #[arg(long, value_name = "DISTANCE", allow_negative_numbers = true)]
     pub stereo: Option<f64>,

@@ -1,6 +1,6 @@
 //! `buzz-convert INPUT OUT_DIR`: the main job.
 
-use super::args::{CompressionArg, ConvertArgs};
+use super::args::{CompressionArg, ConvertArgs, OutputArgs};
 use super::existing::{
     existing, place_of, prepare_report, refuse_inputs, refuse_report_of_another, remove_stale_reports,
     report_files,
@@ -51,7 +51,7 @@ pub fn run(args: ConvertArgs) -> Result<ExitCode> {
     let memory_limit = args.output.memory.as_deref().map(parse::memory).transpose()?;
     let mut job = Job::new(input, &args.scene, &args.image.render, args.image.quality, memory_limit)?;
     warn_of_ignored(&job.scene);
-    choose_image(&mut job, &args)?;
+    choose_image(&mut job.settings, &job.scene, &args.output)?;
     let timing = job.scene.timing;
     let frames = asked.unwrap_or_else(|| (timing.first..=timing.last).collect());
 
@@ -191,30 +191,25 @@ pub fn run(args: ConvertArgs) -> Result<ExitCode> {
     Ok(ExitCode::SUCCESS)
 }
 
-/// Resolves what depends on the image's size.
-fn choose_image(job: &mut Job, args: &ConvertArgs) -> Result<()> {
-    let settings = &mut job.settings;
-    if let Some(text) = &args.output.crop {
+/// Puts into `settings` what is asked of the image.
+pub(super) fn choose_image(settings: &mut Settings, scene: &Scene, args: &OutputArgs) -> Result<()> {
+    if let Some(text) = &args.crop {
         settings.window = parse::crop(text, (settings.width, settings.height))?;
     }
-    if !args.output.exposure.is_finite() {
-        return Err(
-            Error::Usage(format!("--exposure {}: expected a number of stops", args.output.exposure)).into()
-        );
+    if !args.exposure.is_finite() {
+        let message = format!("--exposure {}: expected a number of stops", args.exposure);
+        return Err(Error::Usage(message).into());
     }
-    settings.stereo =
-        args.output.stereo.map(|eyes| parse::stereo(eyes, args.output.convergence)).transpose()?;
-    settings.aovs = parse::aovs(&args.output.aov)?;
-    settings.transparent = args.output.transparent;
-    settings.exposure = args.output.exposure;
-    settings.bounces = args.output.bounces;
-    settings.aa = args.output.aa;
-    settings.light_samples = args.output.light_samples;
-    settings.ambient_samples = args.output.ambient_samples;
-    settings.audit = args.output.audit;
+    settings.stereo = args.stereo.map(|eyes| parse::stereo(eyes, args.convergence)).transpose()?;
+    settings.aovs = parse::aovs(&args.aov)?;
+    settings.transparent = args.transparent;
+    settings.exposure = args.exposure;
+    settings.bounces = args.bounces;
+    settings.aa = args.aa;
+    settings.audit = args.audit;
     memory::refuse_uncountable(settings)?;
     if settings.stereo.is_some() {
-        refuse_parallel(&job.scene, settings)?;
+        refuse_parallel(scene, settings)?;
     }
     Ok(())
 }

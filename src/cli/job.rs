@@ -48,6 +48,8 @@ impl Job {
             render.resolution.as_deref().map_or(Ok(own), |text| parse::resolution(text, own))?;
         let mut settings = Settings::new(width, height);
         settings.camera = camera;
+        settings.light_samples = render.light_samples;
+        settings.ambient_samples = render.ambient_samples;
         let start = Instant::now();
         let accel = Accel::new(&scene);
         let accel_seconds = start.elapsed().as_secs_f64();
@@ -138,14 +140,8 @@ pub fn stem(input: &Path) -> String {
     input.file_stem().map_or_else(|| "frame".to_owned(), |s| s.to_string_lossy().into_owned())
 }
 
-/// More than any machine has; a typo must not start a thread for each of its digits.
-const MOST_THREADS: usize = 1024;
-
 fn use_threads(threads: Option<usize>) -> Result<usize> {
-    if let Some(number) = threads.filter(|n| !(1..=MOST_THREADS).contains(n)) {
-        return Err(Error::Usage(format!("--threads {number}: expected 1 to {MOST_THREADS}")).into());
-    }
-    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads.unwrap_or(0));
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(parse::threads(threads)?);
     pool.build_global().context("the threads could not be started")?;
     Ok(rayon::current_num_threads())
 }

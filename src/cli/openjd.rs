@@ -5,7 +5,8 @@
 //! done. It is the same command over all frames: it reads every file and checks it, renders what is missing, and writes
 //! the report of the whole, in which the tasks' own reports are put together.
 
-use super::args::{Cli, PlanArgs, QualityArg};
+use super::args::{Cli, ConvertArgs, PlanArgs, QualityArg};
+use super::convert::choose_image;
 use super::job::{Job, stem};
 use super::plan_file::PlanFile;
 use super::{one_line, parse};
@@ -13,7 +14,8 @@ use anyhow::Result;
 use buzz::error::Error;
 use buzz::output::NamePattern;
 use buzz::plan::{Plan, Segment, Share};
-use clap::{Parser, ValueEnum};
+use clap::parser::ValueSource;
+use clap::{CommandFactory, Parser, ValueEnum};
 use serde_json::{Value, json};
 
 /// Most values that the specification lets a task parameter have.
@@ -27,6 +29,7 @@ const NOTICE: u32 = 5;
 
 /// The template of a job that renders `plan`.
 pub fn template(args: &PlanArgs, job: &Job, plan: &Plan) -> Result<Value> {
+    refuse_another_plan(&args.convert)?;
     let parameters = parameters(args, job, plan);
     let options = options(args);
     let step = |frames: &str| {
@@ -40,7 +43,7 @@ pub fn template(args: &PlanArgs, job: &Job, plan: &Plan) -> Result<Value> {
         ]);
         let command: Vec<String> =
             command.into_iter().map(String::from).chain(options.iter().cloned()).collect();
-        check(&command, &parameters)?;
+        check(&command, &parameters, job)?;
         script(command, args, job, plan)
     };
     let chunks: Vec<String> = chunks(plan, args.workers).iter().map(|(a, b)| format!("{a}-{b}")).collect();
@@ -126,6 +129,8 @@ fn options(args: &PlanArgs) -> Vec<String> {
     for number in 1..=scene.geometry.len() {
         add("geometry", Some(format!("{{{{Param.Geometry{number}}}}}")));
     }
+    add("light-samples", Some(image.render.light_samples.to_string()).filter(|n| n != "1"));
+    add("ambient-samples", Some(image.render.ambient_samples.to_string()).filter(|n| n != "0"));
     add("threads", image.render.threads.map(|n| n.to_string()));
     if args.workers > 1 {
         // The other machines cannot know for how many it is; without this, each makes the same plan for itself.
@@ -138,8 +143,41 @@ fn options(args: &PlanArgs) -> Vec<String> {
     all
 }
 
+/// Options on which the plan depends, so that the tasks must have those that it was made with.
+const OF_THE_PLAN: [&str; 10] = [
+    "fps",
+    "camera",
+    "start_frame",
+    "turntable",
+    "geometry",
+    "camera_from",
+    "light_samples",
+    "ambient_samples",
+    "segment",
+    "plan",
+];
+
+/// An error if an option of the tasks would change the plan.
+fn refuse_another_plan(convert: &[String]) -> Result<()> {
+    let task =
+        ["buzz-convert", "input", "folder"].map(String::from).into_iter().chain(convert.iter().cloned());
+    let given = Cli::command().try_get_matches_from(task).map_err(unparsed)?;
+    match OF_THE_PLAN.iter().find(|option| given.value_source(option) == Some(ValueSource::CommandLine)) {
+        Some(option) => {
+            let message =
+                format!("--{}: the plan depends on it; give it before the --", option.replace('_', "-"));
+            Err(Error::Usage(message).into())
+        }
+        None => Ok(()),
+    }
+}
+
+fn unparsed(error: clap::Error) -> Error {
+    Error::Usage(one_line(&error.to_string()))
+}
+
 /// An error if a task could not run its command, or would not run it as it stands here.
-fn check(command: &[String], parameters: &[Value]) -> Result<()> {
+fn check(command: &[String], parameters: &[Value], job: &Job) -> Result<()> {
     let value = |argument: &String| {
         let mut resolved = argument.clone();
         for parameter in parameters {
@@ -156,15 +194,15 @@ fn check(command: &[String], parameters: &[Value]) -> Result<()> {
         return Err(Error::Usage(message).into());
     }
     let parsed = Cli::try_parse_from(std::iter::once("buzz-convert".to_owned()).chain(resolved));
-    let task = parsed.map_err(|e| Error::Usage(one_line(&e.to_string())))?.convert.output;
-    if task.report.is_some() {
+    let ConvertArgs { image, output, .. } = parsed.map_err(unparsed)?.convert;
+    if output.report.is_some() {
         return Err(Error::Usage("--report: each task writes its own report; leave it out".into()).into());
     }
-    // What a task would find out about its options before it reads the scene.
-    parse::aovs(&task.aov)?;
-    task.stereo.map(|eyes| parse::stereo(eyes, task.convergence)).transpose()?;
-    task.memory.as_deref().map(parse::memory).transpose()?;
-    NamePattern::parse(task.name.as_deref().unwrap_or(NamePattern::DEFAULT), "shot")?;
+    // What a task would find out before it renders.
+    parse::threads(image.render.threads)?;
+    choose_image(&mut job.settings.clone(), &job.scene, &output)?;
+    output.memory.as_deref().map(parse::memory).transpose()?;
+    NamePattern::parse(output.name.as_deref().unwrap_or(NamePattern::DEFAULT), "shot")?;
     Ok(())
 }
 

@@ -179,6 +179,17 @@ pub fn aovs(text: &str) -> Result<AovSet> {
     Ok(set)
 }
 
+/// More than any machine has; a typo must not start a thread for each of its digits.
+const MOST_THREADS: usize = 1024;
+
+/// A number of threads; 0, for as many as there are processors, if none is asked for.
+pub fn threads(asked: Option<usize>) -> Result<usize> {
+    match asked.filter(|n| !(1..=MOST_THREADS).contains(n)) {
+        Some(number) => Err(usage("--threads", &number.to_string(), &format!("1 to {MOST_THREADS}"))),
+        None => Ok(asked.unwrap_or(0)),
+    }
+}
+
 /// `auto` or a number of frames.
 pub fn segment(text: &str) -> Result<u32> {
     match text {

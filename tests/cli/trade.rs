@@ -12,7 +12,7 @@ fn trade(arguments: &[&str]) -> crate::rig::Outcome {
 #[test]
 fn the_figures_are_those_of_separate_runs() {
     let (folder, out) = fresh();
-    let (scene, small) = (courtyard(), ["-r", "64x36", "-f", "0-40"]);
+    let (scene, small) = (courtyard(), ["-r", "64x36", "--ambient-samples", "4", "-f", "0-40"]);
     let scene_text = scene.to_str().unwrap();
     let done = trade(&[&[scene_text, out.to_str().unwrap(), "-j", "2"], &small[..]].concat()).ok();
     assert_eq!(listing(&out), ["trade.csv", "trade.html", "trade.json", "trade.txt"]);
@@ -24,14 +24,21 @@ fn the_figures_are_those_of_separate_runs() {
     let spans: Vec<String> =
         trade["spans"].as_array().unwrap().iter().map(|s| format!("{}-{}", s[0], s[1])).collect();
     let (frames, full) = (spans.join(","), folder.path().join("full"));
-    run(&scene, &full, &format!("-r 64x36 -q full -f {frames}")).ok();
+    run(&scene, &full, &format!("-r 64x36 --ambient-samples 4 -q full -f {frames}")).ok();
     for measured in qualities {
         let name = measured["quality"].as_str().unwrap();
         assert!(done.out.contains(name), "{name} is not in the table");
         let alone = folder.path().join(format!("{name}-alone"));
         let report = alone.join("r.json");
-        run(&scene, &alone, &format!("-r 64x36 -q {name} --audit -f {frames} --report {}", report.display()))
-            .ok();
+        run(
+            &scene,
+            &alone,
+            &format!(
+                "-r 64x36 --ambient-samples 4 -q {name} --audit -f {frames} --report {}",
+                report.display()
+            ),
+        )
+        .ok();
         let compared =
             buzz(["compare", alone.to_str().unwrap(), full.to_str().unwrap(), "--format", "json"]).ok();
         let compared: Value = serde_json::from_str(&compared.out).unwrap();
