@@ -7,6 +7,8 @@ mod determinism;
 mod farm;
 #[cfg(unix)]
 mod faults;
+#[cfg(unix)]
+mod found;
 mod inspect;
 mod layers;
 mod motion;

@@ -1,6 +1,6 @@
 //! Bad input, bad options, bad places to write to: one clear line, and the right code.
 
-use crate::rig::{buzz, fresh, listing, run};
+use crate::rig::{buzz, frames_in, fresh, listing, run};
 use crate::stage::Stage;
 use std::fs;
 
@@ -241,4 +241,26 @@ fn what_is_no_number_is_not_the_same_as_black() {
         buzz(["compare".as_ref(), one.as_os_str(), other.as_os_str()])
             .refused(3, &["nan/s.0000.exr", "pixel 3,2", "pixels: 1"]);
     }
+}
+
+#[test]
+fn an_image_that_no_memory_can_hold_is_refused_before_it_is_rendered() {
+    let (folder, out) = fresh();
+    let scene = Stage::drifting(2).write(&folder.path().join("s.gltf"));
+    // Even where everything else is shared, a pixel takes a hundred bytes.
+    let deep = out.join("shot 1").join("v2");
+    run(&scene, &deep, "-r 32768x32767 --progress none").refused(2, &["--memory", "MiB", "--resolution"]);
+    // Not even the folders that were made for it remain.
+    assert!(!out.exists());
+}
+
+#[test]
+fn more_samples_than_can_be_numbered_are_refused_but_in_parts() {
+    let (folder, out) = fresh();
+    let scene = Stage::drifting(2).write(&folder.path().join("s.gltf"));
+    for options in ["-r 65536x60000", "-r 16384x16384 --aa 3"] {
+        run(&scene, &out, options).refused(2, &["--resolution, --aa", "--crop"]);
+    }
+    run(&scene, &out, "-r 65536x60000 --crop 30000,30000,16,16 -f 0").ok();
+    assert_eq!(frames_in(&out).len(), 1);
 }

@@ -1,4 +1,4 @@
-//! Frames that are there already. (Damaged and foreign ones: `faults.rs`.)
+//! Frames that are there already. (Damaged and foreign ones: `found.rs`.)
 
 use crate::rig::{Outcome, frames_in, fresh, json, run};
 use crate::stage::Stage;

@@ -4,5 +4,6 @@
 
 mod compare;
 mod exr;
+mod sink;
 #[path = "../support/mod.rs"]
 mod support;

@@ -5,6 +5,7 @@
 use buzz::frame::{
     Cover, Frame, FrameKind, FrameStats, Matte, PixelClass, RayCounts, StageSeconds, SubPixelCounts, Window,
 };
+use buzz::output::exr::encode;
 use buzz::output::{Compression, FileOptions, SettingsHash, SettingsHasher};
 use buzz::scene::{Lens, Projection, Rational, View};
 use glam::{DVec2, DVec3};
@@ -132,4 +133,9 @@ pub fn options(compression: Compression) -> FileOptions {
         quality: "half-pixel".into(),
         settings_hash: hash(),
     }
+}
+
+/// A frame's file.
+pub fn bytes_of(frame: &Frame, compression: Compression) -> Vec<u8> {
+    encode(frame, &options(compression)).unwrap().parts.concat()
 }
