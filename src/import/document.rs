@@ -246,7 +246,8 @@ impl<'a> Element<'a> {
 
 /// Reads a regular file; a pipe or device could be endless.
 pub(super) fn read_file(file: &Path) -> Result<Vec<u8>> {
-    read_regular(file).map_err(|why| Error::input(file, "file", why))
+    let failed = |why| Error::input(file, "file", format!("{why}; give the path of a file that may be read"));
+    read_regular(file).map_err(failed)
 }
 
 /// The bytes of a regular file, or what is wrong with it.

@@ -22,7 +22,7 @@ fn input_that_cannot_be_rendered_is_refused_with_3() {
     stage.json.as_object_mut().unwrap().remove("cameras");
     stage.write(&path("blind.gltf"));
     for (name, parts) in [
-        ("missing.gltf", ["missing.gltf", "No such file"]),
+        ("missing.gltf", ["No such file", "give the path"]),
         ("folder.gltf", ["folder.gltf", "not a regular file"]),
         ("walk.fbx", ["walk.fbx", "glTF"]),
         ("broken.gltf", ["broken.gltf", "line 1 column"]),
