@@ -11,18 +11,20 @@ use super::plan_file::PlanFile;
 use super::progress::{Progress, Work};
 use super::say;
 use super::summary::{report, summary};
+use super::warnings::Warnings;
 use super::{memory, parse};
 use anyhow::{Context, Result};
 use buzz::error::Error;
 use buzz::frame::{Aov, FrameId, FrameKind, FrameStats, StereoEye};
 use buzz::output::{
-    Compression, ExrSink, FileOptions, FrameRecord, NamePattern, OutputFolder, Review, Run, RunSeconds,
-    SettingsHash, SettingsHasher, Thumbnails, WithThumbnails, earlier_runs, peak_bytes,
+    Compression, ExrSink, FileOptions, FrameRecord, NamePattern, OutputFolder, Report, Review, Run,
+    RunSeconds, SettingsHash, SettingsHasher, Thumbnails, WithThumbnails, earlier_runs, peak_bytes,
 };
 use buzz::plan::{Plan, Segment};
-use buzz::scene::{Projection, Scene};
+use buzz::scene::{Projection, Scene, Timing};
 use buzz::sequence::{FrameSink, Observer, Settings, render_sequence};
 use std::collections::BTreeSet;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::time::{Instant, SystemTime, UNIX_EPOCH};
 
@@ -31,14 +33,7 @@ pub const ADVICE: &str = "; finished frames are whole: run again with --skip-exi
 
 pub fn run(args: ConvertArgs) -> Result<ExitCode> {
     let (started, start) = (SystemTime::now(), Instant::now());
-    let (Some(input), Some(out_dir)) = (&args.input, &args.out_dir) else {
-        return Err(Error::Usage("INPUT and OUT_DIR are missing".into()).into());
-    };
-    if input.extension().is_none() && !input.exists() {
-        let message =
-            "there is no such file, nor such a command; commands are plan, inspect, compare and trade";
-        return Err(Error::input(input, "file", message).into());
-    }
+    let (input, out_dir) = places(&args)?;
     let interrupt = Interrupt::watch(ADVICE).context("signals cannot be watched")?;
     let names =
         NamePattern::parse(args.output.name.as_deref().unwrap_or(NamePattern::DEFAULT), &stem(input))?;
@@ -52,36 +47,13 @@ pub fn run(args: ConvertArgs) -> Result<ExitCode> {
     let mut job = Job::new(input, &args.scene, &args.image.render, args.image.quality, memory_limit)?;
     warn_of_ignored(&job.scene);
     choose_image(&mut job.settings, &job.scene, &args.output)?;
-    let timing = job.scene.timing;
-    let frames = asked.unwrap_or_else(|| (timing.first..=timing.last).collect());
 
-    let whole = frames == (timing.first..=timing.last).collect();
-    let report_path = args.output.report.clone().unwrap_or_else(|| out_dir.join(report_name(&frames, whole)));
-
-    let mut warnings = Warnings::default();
-
+    let request = Request::new(&args, input, out_dir, asked, &job.scene.timing);
     interrupt.writing();
-    let is_elsewhere = args.output.report.is_some();
-    if is_elsewhere {
-        prepare_report(&report_path)?;
-    }
-    let pictures = frames.iter().flat_map(|&f| pictures_of(f, &job.settings));
-    let folder = OutputFolder::open(out_dir, names, pictures)?;
-    if !folder.is_locked() {
-        let path = folder.path().display();
-        warnings.add(format!("{path}: the file system has no locks: do not run twice on the same frames"));
-    }
-    // In the output folder: which had to be made first.
-    if !is_elsewhere {
-        prepare_report(&report_path)?;
-    }
-    let mut inputs = job.scene.files.clone();
-    inputs.extend(args.output.plan.as_ref().and_then(|plan| plan.canonicalize().ok()));
-    let pictures = frames.iter().flat_map(|&f| pictures_of(f, &job.settings)).map(|id| folder.file_of(id));
-    refuse_inputs(pictures.chain(report_files(&report_path)), &inputs)?;
-    if !args.output.overwrite {
-        refuse_report_of_another(&report_path, input)?;
-    }
+    let folder = claim_folder(&request, names, &job)?;
+    let mut warnings = Warnings::default();
+    warnings.of_no_locks(&folder);
+
     memory::refuse_planning_over(memory_limit, &job)?;
     let planning = Instant::now();
     let plan = match &replayed {
@@ -89,106 +61,183 @@ pub fn run(args: ConvertArgs) -> Result<ExitCode> {
         None => job.plan(1, &*interrupt)?,
     };
     let plan_seconds = planning.elapsed().as_secs_f64();
+
     let hash = settings_hash(&job, &plan, &args);
-    let skipped = existing(&folder, &frames, &hash, &job.settings, &args, &interrupt)?;
-    let beyond = frames.iter().filter(|&&f| !(timing.first..=timing.last).contains(&f)).count();
-    if beyond > 0 {
-        warnings.add(format!(
-            "--frames: {beyond} of them are not in the scene's range, {}-{}; curves stand still there",
-            timing.first, timing.last
-        ));
-    }
-    let to_render: BTreeSet<i64> =
-        frames.difference(&skipped.iter().map(|r| r.id.number).collect()).copied().collect();
+    let kept = existing(&folder, &request.frames, &hash, &job.settings, &args, &interrupt)?;
+    warnings.of_frames_beyond(&request.frames, &job.scene.timing);
+    let kept_numbers: BTreeSet<i64> = kept.iter().map(|record| record.id.number).collect();
+    let to_render = &request.frames - &kept_numbers;
     if !to_render.is_empty() {
         memory::refuse_over(memory_limit, &job, 0)?;
+        let is_there = |&&f: &&i64| pictures_of(f, &job.settings).any(|id| folder.file_of(id).exists());
+        let replaced = to_render.iter().filter(is_there).copied().collect();
+        let whole = out_dir.join(WHOLE_REPORT);
+        remove_stale_reports(&request.report, &whole, input, &hash, &replaced, &args)?;
     }
+    let mut thumbnails = Thumbnails::of(&request.frames, job.scene.timing.pixel_aspect);
+    let shown = kept.iter().map(|record| record.id).filter(|id| id.eye != Some(StereoEye::Right));
+    let files: Vec<_> = shown.map(|id| (id.number, folder.file_of(id))).collect();
+    thumbnails.read(&files, || interrupt.stop_requested())?;
 
     let options = FileOptions {
         compression: compression(args.output.compression),
-        fps: timing.fps,
+        fps: job.scene.timing.fps,
         quality: job.settings.quality.name().into(),
         settings_hash: hash.clone(),
     };
-    let is_there = |&&frame: &&i64| pictures_of(frame, &job.settings).any(|id| folder.file_of(id).exists());
-    let replaced: BTreeSet<i64> = to_render.iter().filter(is_there).copied().collect();
     let mut sink = ExrSink::new(folder, options)?;
-    if !to_render.is_empty() {
-        let whole = out_dir.join("report.json");
-        remove_stale_reports(&report_path, &whole, input, &hash, &replaced, &args)?;
-    }
-    let count = to_render.iter().flat_map(|&f| pictures_of(f, &job.settings)).count();
-    let work = Work { frames: count, on_the_way: plan.on_the_way(&to_render) };
-    let mut thumbnails = Thumbnails::of(&frames, timing.pixel_aspect);
-    let pictured = skipped.iter().filter(|r| r.id.eye != Some(StereoEye::Right));
-    let files: Vec<_> = pictured.map(|r| (r.id.number, sink.folder().file_of(r.id))).collect();
-    thumbnails.read(&files, || interrupt.stop_requested())?;
+    let frames = to_render.iter().flat_map(|&f| pictures_of(f, &job.settings)).count();
+    let work = Work { frames, on_the_way: plan.on_the_way(&to_render) };
     // Its clock tells how long frames take: it begins with them.
     let progress = Progress::new(args.output.progress, work, interrupt);
-    let mut recorder = Recorder { progress, records: skipped, on_the_way: 0.0 };
-    let Job { scene, accel, settings, .. } = &mut job;
-    let mut shown = WithThumbnails { sink: &mut sink, thumbnails: &mut thumbnails };
-    let rendered = render_sequence(scene, accel, settings, &plan, &to_render, &mut shown, &mut recorder);
-    // Frames that are under way are still written, whatever stopped the run.
-    let written = sink.finish();
-    recorder.progress.finish();
-    rendered?;
+    let mut recorder = Recorder { progress, records: kept, on_the_way: 0.0 };
+    render(&mut job, &plan, &to_render, &mut sink, &mut thumbnails, &mut recorder)?;
     let mut records = recorder.records;
-    for (id, seconds) in written? {
-        if let Some(record) = records.iter_mut().find(|r| r.id == id) {
-            record.stats.seconds.write = seconds.write;
-        }
-    }
-    records.sort_by_key(|r| r.id);
-    let repaired = sink.repaired();
-    if let [(first, _), rest @ ..] = repaired.as_slice() {
-        let frames = if rest.is_empty() { String::new() } else { format!(" and {} more", rest.len()) };
-        let values: u64 = repaired.iter().map(|(_, values)| values).sum();
-        warnings.add(format!(
-            "frame {first}{frames}: {values} values were not finite or too large for their channel and were replaced"
-        ));
-    }
+    warnings.of_repaired(&sink.repaired());
 
-    let (report_folder, report_name) = place_of(&report_path);
+    let (report_folder, report_name) = place_of(&request.report);
     let (mut runs, said) = earlier_runs(&mut records, report_folder, &report_name, &hash);
     said.into_iter().for_each(|warning| warnings.add_unless_given(warning));
-    let seconds = RunSeconds {
-        import: job.import_seconds,
-        accel: job.accel_seconds,
-        plan: plan_seconds,
-        on_the_way: recorder.on_the_way,
-        wall: start.elapsed().as_secs_f64(),
-    };
     runs.push(Run {
         report: report_name,
         started: started.duration_since(UNIX_EPOCH).map_or(0, |since| since.as_millis() as u64),
         threads: job.threads,
-        seconds,
+        seconds: RunSeconds {
+            import: job.import_seconds,
+            accel: job.accel_seconds,
+            plan: plan_seconds,
+            on_the_way: recorder.on_the_way,
+            wall: start.elapsed().as_secs_f64(),
+        },
         peak_bytes: peak_bytes(),
     });
     let report = report(input, hash, &job, &plan, records, (runs, warnings.given));
-    report.write_json(&report_path)?;
-    report.write_html(&report_path.with_extension("html"), &thumbnails.encoded())?;
-    // Of a pair, the left eye is looked at.
-    let names = sink.folder().names();
-    let review_names =
-        if job.settings.stereo.is_some() { names.of_eye(StereoEye::Left) } else { names.clone() };
-    let review = Review {
-        folder: out_dir,
-        names: &review_names,
-        frames: &frames,
-        cuts: &plan.cuts,
-        keyframes: &report.plan.keyframes,
-        fps: timing.fps,
-        width: job.settings.width,
-        height: job.settings.height,
-        pixel_aspect: timing.pixel_aspect,
-        window: job.settings.window,
-        has_class: job.settings.aovs.contains(Aov::Class),
-    };
-    review.write(&report_path, &thumbnails)?;
+    write_report(&report, &request, &job, sink.folder().names(), &thumbnails)?;
     say::result(&summary(&report))?;
     Ok(ExitCode::SUCCESS)
+}
+
+/// The input and the output folder.
+fn places(args: &ConvertArgs) -> Result<(&Path, &Path)> {
+    let (Some(input), Some(out_dir)) = (&args.input, &args.out_dir) else {
+        return Err(Error::Usage("INPUT and OUT_DIR are missing".into()).into());
+    };
+    if input.extension().is_none() && !input.exists() {
+        let message =
+            "there is no such file, nor such a command; commands are plan, inspect, compare and trade";
+        return Err(Error::input(input, "file", message).into());
+    }
+    Ok((input, out_dir))
+}
+
+/// What a run is asked to make, of what, and where.
+struct Request<'a> {
+    args: &'a ConvertArgs,
+    input: &'a Path,
+    out_dir: &'a Path,
+    frames: BTreeSet<i64>,
+    report: PathBuf,
+}
+
+/// The report of a scene's whole range.
+const WHOLE_REPORT: &str = "report.json";
+
+impl<'a> Request<'a> {
+    /// Of the frames that are asked for, or the whole range.
+    fn new(
+        args: &'a ConvertArgs,
+        input: &'a Path,
+        out_dir: &'a Path,
+        asked: Option<BTreeSet<i64>>,
+        timing: &Timing,
+    ) -> Self {
+        let range: BTreeSet<i64> = (timing.first..=timing.last).collect();
+        let frames = asked.unwrap_or_else(|| range.clone());
+        // Part of a range has a report of its own, so that several runs may share a folder.
+        let name = match (frames.first(), frames.last()) {
+            (Some(first), Some(last)) if frames != range => format!("report.{first}-{last}.json"),
+            _ => WHOLE_REPORT.into(),
+        };
+        let report = args.output.report.clone().unwrap_or_else(|| out_dir.join(name));
+        Self { args, input, out_dir, frames, report }
+    }
+}
+
+/// Opens the output folder for the run's frames. Finds out before the rendering that nothing which the run reads, and no other scene's report,
+/// is replaced, and that its own report can be written.
+fn claim_folder(request: &Request, names: NamePattern, job: &Job) -> Result<OutputFolder> {
+    let Request { args, input, out_dir, frames, report } = request;
+    let pictures = || frames.iter().flat_map(|&frame| pictures_of(frame, &job.settings));
+    let is_elsewhere = args.output.report.is_some();
+    if is_elsewhere {
+        prepare_report(report)?;
+    }
+    let folder = OutputFolder::open(out_dir, names, pictures())?;
+    // In the output folder: which had to be made first.
+    if !is_elsewhere {
+        prepare_report(report)?;
+    }
+    let mut inputs = job.scene.files.clone();
+    inputs.extend(args.output.plan.as_ref().and_then(|plan| plan.canonicalize().ok()));
+    refuse_inputs(pictures().map(|id| folder.file_of(id)).chain(report_files(report)), &inputs)?;
+    if !args.output.overwrite {
+        refuse_report_of_another(report, input)?;
+    }
+    Ok(folder)
+}
+
+/// Renders `frames` into `sink`. Then the recorder has them beside those that it had, in order.
+fn render(
+    job: &mut Job,
+    plan: &Plan,
+    frames: &BTreeSet<i64>,
+    sink: &mut ExrSink,
+    thumbnails: &mut Thumbnails,
+    recorder: &mut Recorder,
+) -> Result<()> {
+    let Job { scene, accel, settings, .. } = job;
+    let mut shown = WithThumbnails { sink, thumbnails };
+    let rendered = render_sequence(scene, accel, settings, plan, frames, &mut shown, recorder);
+    // Frames that are under way are still written, whatever stopped the run.
+    let written = sink.finish();
+    recorder.progress.finish();
+    rendered?;
+    for (id, seconds) in written? {
+        if let Some(record) = recorder.records.iter_mut().find(|record| record.id == id) {
+            record.stats.seconds.write = seconds.write;
+        }
+    }
+    recorder.records.sort_by_key(|record| record.id);
+    Ok(())
+}
+
+/// Writes the report, its page, and its folder for review.
+fn write_report(
+    report: &Report,
+    request: &Request,
+    job: &Job,
+    names: &NamePattern,
+    thumbnails: &Thumbnails,
+) -> Result<()> {
+    report.write_json(&request.report)?;
+    report.write_html(&request.report.with_extension("html"), &thumbnails.encoded())?;
+    let (settings, timing) = (&job.settings, &job.scene.timing);
+    // Of a pair, the left eye is looked at.
+    let names = if settings.stereo.is_some() { names.of_eye(StereoEye::Left) } else { names.clone() };
+    let review = Review {
+        folder: request.out_dir,
+        names: &names,
+        frames: &request.frames,
+        cuts: &report.plan.cuts,
+        keyframes: &report.plan.keyframes,
+        fps: timing.fps,
+        width: settings.width,
+        height: settings.height,
+        pixel_aspect: timing.pixel_aspect,
+        window: settings.window,
+        has_class: settings.aovs.contains(Aov::Class),
+    };
+    Ok(review.write(&request.report, thumbnails)?)
 }
 
 /// Puts into `settings` what is asked of the image.
@@ -231,25 +280,6 @@ fn refuse_parallel(scene: &Scene, settings: &Settings) -> Result<()> {
     }
 }
 
-/// What was warned of, for the report.
-#[derive(Default)]
-struct Warnings {
-    given: Vec<String>,
-}
-
-impl Warnings {
-    fn add(&mut self, warning: String) {
-        say::complain(format_args!("warning: {warning}"));
-        self.given.push(warning);
-    }
-
-    fn add_unless_given(&mut self, warning: String) {
-        if !self.given.contains(&warning) {
-            self.add(warning);
-        }
-    }
-}
-
 /// Each frame's pictures: one, or the eyes'.
 pub(super) fn pictures_of(frame: i64, settings: &Settings) -> impl Iterator<Item = FrameId> {
     let eyes: &[Option<StereoEye>] = match settings.stereo {
@@ -287,14 +317,6 @@ fn compression(compression: CompressionArg) -> Compression {
         CompressionArg::Zips => Compression::Zips,
         CompressionArg::Zip => Compression::Zip,
         CompressionArg::Piz => Compression::Piz,
-    }
-}
-
-/// `report.json`, or one of its own for a part of the range, so that several runs may share a folder.
-fn report_name(frames: &BTreeSet<i64>, whole: bool) -> String {
-    match (frames.first(), frames.last()) {
-        (Some(first), Some(last)) if !whole => format!("report.{first}-{last}.json"),
-        _ => "report.json".into(),
     }
 }
 

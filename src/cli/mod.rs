@@ -16,6 +16,7 @@ mod progress;
 mod say;
 mod summary;
 mod trade;
+mod warnings;
 
 use anyhow::Result;
 use args::{Cli, Command};
