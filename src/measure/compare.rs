@@ -71,8 +71,8 @@ pub struct MeanError {
 /// Factor on differences in pictures of them, so that small ones can be seen.
 pub const ENHANCED: f32 = 4.0;
 
-/// Compares the EXR files of folder `sequence` with those of folder `reference`, paired by the frame numbers in their names
-/// (and, if a folder holds several sequences, by the rest of the names). If a folder for `pictures` is given, a PNG a frame is
+/// Compares the EXR files of folder `sequence` with those of folder `reference`, paired by the frame numbers in their names,
+/// which ours state too (and, if a folder holds several sequences, by the rest of the names). If a folder for `pictures` is given, a PNG a frame is
 /// written there: the frame, its reference, and the absolute difference times [`ENHANCED`], side by side.
 ///
 /// # Errors

@@ -88,18 +88,19 @@ impl ExrSink {
     /// Waits until `ready`. A caller inside the pool works on the pool's tasks meanwhile: with one thread, nobody else
     /// would.
     fn wait(&self, ready: impl Fn(&State) -> bool) -> MutexGuard<'_, State> {
+        let Shared { changed, .. } = &*self.shared;
         let mut state = self.shared.lock();
+        if rayon::current_thread_index().is_none() {
+            return changed.wait_while(state, |s| !ready(s)).unwrap_or_else(PoisonError::into_inner);
+        }
         while !ready(&state) {
-            if rayon::current_thread_index().is_some() {
-                drop(state);
-                let idle = rayon::yield_now() != Some(rayon::Yield::Executed);
-                state = self.shared.lock();
-                if idle && !ready(&state) {
-                    let wait = self.shared.changed.wait_timeout(state, Duration::from_millis(1));
-                    state = wait.unwrap_or_else(PoisonError::into_inner).0;
-                }
-            } else {
-                state = self.shared.changed.wait(state).unwrap_or_else(PoisonError::into_inner);
+            drop(state);
+            let has_worked = rayon::yield_now() == Some(rayon::Yield::Executed);
+            state = self.shared.lock();
+            if !has_worked {
+                // Not for long: a task may come, of which nothing is said here.
+                let waited = changed.wait_timeout_while(state, Duration::from_millis(1), |s| !ready(s));
+                (state, _) = waited.unwrap_or_else(PoisonError::into_inner);
             }
         }
         state

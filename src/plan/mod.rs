@@ -145,6 +145,12 @@ impl Plan {
         };
         self.segments.iter().map(of_segment).sum()
     }
+
+    /// The segment that holds `frame`.
+    pub fn segment_of(&self, frame: i64) -> Option<&Segment> {
+        let i = self.segments.partition_point(|s| s.last < frame);
+        self.segments.get(i).filter(|s| s.first <= frame)
+    }
 }
 
 /// Plans a sequence from its path (consecutive frames; at least one).
@@ -182,29 +188,17 @@ pub fn replay(
     segments: &[(Segment, Reason)],
     cuts: &[i64],
 ) -> Result<Plan, String> {
-    let count = |from: i64, to: i64| usize::try_from(to.saturating_sub(from)).unwrap_or(0);
-    let of_key = |(s, _): &(Segment, Reason)| (s.key, [count(s.first, s.key), count(s.key, s.last)]);
-    let reaches: HashMap<i64, [usize; 2]> = segments.iter().map(of_key).collect();
+    let frames = |from: i64, to: i64| usize::try_from(to.saturating_sub(from)).unwrap_or(0);
+    let reach_of = |s: &Segment| [frames(s.first, s.key), frames(s.key, s.last)];
+    let reaches: HashMap<i64, [usize; 2]> = segments.iter().map(|(s, _)| (s.key, reach_of(s))).collect();
     let reach = |place: usize| reaches.get(&path[place].frame).copied().unwrap_or_default();
     let survey = Survey::of(path, cuts, quality, reach);
     let mut plan = Plan { cuts: cuts.to_vec(), ..Plan::default() };
-    for &(Segment { key, first, last }, reason) in segments {
-        let range = Range { key: survey.place(key), first: plan.frames.len(), last: survey.place(last) };
-        let fail = |what: String| Err(format!("segment {first}-{last} of key frame {key} {what}"));
-        let held = path.get(range.first..=range.last);
-        let Some(frames) = held.filter(|f| f.first().is_some_and(|f| f.frame == first)) else {
-            let next =
-                path.get(range.first).map_or_else(|| "the end".into(), |f| format!("frame {}", f.frame));
-            return fail(format!("must begin with {next}, which is next, and end within the sequence"));
-        };
-        if !(first..=last).contains(&key) {
-            return fail("does not hold it".into());
-        }
-        for PathFrame { frame, .. } in &frames[1..] {
-            if cuts.contains(frame) || named.contains(frame) {
-                return fail(format!("goes on at frame {frame}, after a cut"));
-            }
-        }
+    for &(segment, reason) in segments {
+        let range = survey.range_of(segment, plan.frames.len(), &[cuts, named]).map_err(|what| {
+            let Segment { key, first, last } = segment;
+            format!("segment {first}-{last} of key frame {key} {what}")
+        })?;
         survey.add(&mut plan, range, reason);
     }
     match path.get(plan.frames.len()) {
@@ -251,6 +245,25 @@ impl<'a> Survey<'a> {
         usize::try_from(frame.saturating_sub(first)).unwrap_or(self.path.len()).min(self.path.len())
     }
 
+    /// The places of `segment`, which is to begin at place `next`; if it does not fit there, why not.
+    fn range_of(&self, segment: Segment, next: usize, cuts: &[&[i64]; 2]) -> Result<Range, String> {
+        let Segment { key, first, last } = segment;
+        let range = Range { key: self.place(key), first: next, last: self.place(last) };
+        let begins = self.path.get(next).is_some_and(|f| f.frame == first);
+        if !begins || !(next..self.path.len()).contains(&range.last) {
+            let next = self.path.get(next).map_or("the end".into(), |f| format!("frame {}", f.frame));
+            return Err(format!("must begin with {next}, which is next, and end within the sequence"));
+        }
+        if !(first..=last).contains(&key) {
+            return Err("does not hold it".into());
+        }
+        let is_after_cut = |f: &&PathFrame| cuts.iter().any(|cuts| cuts.contains(&f.frame));
+        match self.path[next + 1..=range.last].iter().find(is_after_cut) {
+            Some(PathFrame { frame, .. }) => Err(format!("goes on at frame {frame}, after a cut")),
+            None => Ok(range),
+        }
+    }
+
     /// Why a segment begins at place `first`, where segments are at most so long.
     fn reason(&self, first: usize, full: bool, longest: u32) -> Reason {
         match first {
@@ -273,13 +286,5 @@ impl<'a> Survey<'a> {
             let frame = number(place);
             plan.frames.push(PlannedFrame { frame, kind: segment.kind(frame), predicted_traced });
         }
-    }
-}
-
-impl Plan {
-    /// The segment that holds `frame`.
-    pub fn segment_of(&self, frame: i64) -> Option<&Segment> {
-        let i = self.segments.partition_point(|s| s.last < frame);
-        self.segments.get(i).filter(|s| s.first <= frame)
     }
 }

@@ -49,31 +49,19 @@ pub fn trade(
     };
     let mut runs: Vec<Run> = candidates.iter().map(|candidate| Run::new(candidate, spans)).collect();
     let mut truth = Truth::default();
-    let (mut done, total) = (0, ROUNDS * runs.len() * spans.len());
-    for round in 0..ROUNDS {
-        for turn in 0..spans.len() {
-            let forth = 0..runs.len();
-            let order: Vec<usize> = if round % 2 == 0 { forth.collect() } else { forth.rev().collect() };
-            for i in order {
-                let run = &mut runs[i];
-                match (round, i) {
-                    (0, 0) => {
-                        run.render(
-                            scene,
-                            accel,
-                            turn,
-                            &mut KeepTruth { truth: &mut truth, free: None },
-                            &*watch,
-                        )?;
-                    }
-                    (0, _) | (_, 0) => run.render(scene, accel, turn, &mut NullSink::default(), &*watch)?,
-                    // The whole truth is known since the first round, and with it the exposure.
-                    _ => run.check(scene, accel, turn, &truth, &*watch)?,
-                }
-                done += 1;
-                watch.rendered(run.candidate.settings.quality, done, total);
+    let turns = turns(runs.len(), spans.len());
+    for (done, &Turn { round, span, quality }) in turns.iter().enumerate() {
+        let run = &mut runs[quality];
+        match (round, quality) {
+            (0, 0) => {
+                let mut sink = KeepTruth { truth: &mut truth, free: None };
+                run.render(scene, accel, span, &mut sink, &*watch)?;
             }
+            (0, _) | (_, 0) => run.render(scene, accel, span, &mut NullSink::default(), &*watch)?,
+            // The whole truth is known since the first round, and with it the exposure.
+            _ => run.check(scene, accel, span, &truth, &*watch)?,
         }
+        watch.rendered(run.candidate.settings.quality, done + 1, turns.len());
     }
     let settings = &first.settings;
     Ok(Trade {
@@ -88,6 +76,27 @@ pub fn trade(
         spans: spans.iter().map(|s| [s.first, s.last]).collect(),
         qualities: runs.into_iter().map(|run| run.measured(&truth)).collect(),
     })
+}
+
+/// A span to be rendered by a quality.
+struct Turn {
+    round: usize,
+    span: usize,
+    quality: usize,
+}
+
+/// Of so many qualities and spans each with each: every span by all qualities before the next one, in every other round by the last
+/// quality first.
+fn turns(qualities: usize, spans: usize) -> Vec<Turn> {
+    let mut turns = Vec::new();
+    for (round, span) in (0..ROUNDS).flat_map(|round| (0..spans).map(move |span| (round, span))) {
+        let turn = |quality: usize| Turn { round, span, quality };
+        match round % 2 {
+            0 => turns.extend((0..qualities).map(turn)),
+            _ => turns.extend((0..qualities).rev().map(turn)),
+        }
+    }
+    turns
 }
 
 /// A quality on its way.
@@ -116,13 +125,13 @@ impl<'a> Run<'a> {
         &mut self,
         scene: &Scene,
         accel: &mut Accel,
-        turn: usize,
+        span: usize,
         sink: &mut dyn FrameSink,
         watch: &dyn Watch,
     ) -> Result<()> {
         let Candidate { settings, plan } = self.candidate;
         let mut recorder = Recorder { takes: &mut self.takes, watch };
-        render_sequence(scene, accel, settings, plan, &self.frames[turn], sink, &mut recorder)
+        render_sequence(scene, accel, settings, plan, &self.frames[span], sink, &mut recorder)
     }
 
     /// Renders, audits and compares. Neither the audit nor the comparison is timed.
@@ -130,7 +139,7 @@ impl<'a> Run<'a> {
         &mut self,
         scene: &Scene,
         accel: &mut Accel,
-        turn: usize,
+        span: usize,
         truth: &Truth,
         watch: &dyn Watch,
     ) -> Result<()> {
@@ -139,7 +148,7 @@ impl<'a> Run<'a> {
         let (width, exposure) = (settings.window.width, truth.exposure());
         let mut sink = CheckSink { exposure, width, check: &mut self.check, truth, free: None };
         let mut recorder = Recorder { takes: &mut self.takes, watch };
-        render_sequence(scene, accel, &settings, plan, &self.frames[turn], &mut sink, &mut recorder)
+        render_sequence(scene, accel, &settings, plan, &self.frames[span], &mut sink, &mut recorder)
     }
 
     fn measured(self, truth: &Truth) -> Measured {
