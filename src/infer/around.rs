@@ -118,8 +118,14 @@ impl<'a> Around<'a> {
     }
 
     /// Samples that name the triangles of the surface of old sample `i` here, each once, that of `i` first; none unless the
-    /// pixel's centre lies within that surface. Of a surface behind others that is known only if neighbours are trusted.
-    pub fn surface_of(&self, i: usize, trust: Trust) -> Option<Nearby> {
+    /// pixel's centre lies within that surface. Of a surface behind others that is known only if neighbours are trusted. `body_of`
+    /// is the body that carries an old sample.
+    pub fn surface_of(
+        &self,
+        i: usize,
+        trust: Trust,
+        body_of: impl Fn(usize) -> Option<usize>,
+    ) -> Option<Nearby> {
         let (mut triangles, mut others) = (Nearby::NONE, Nearby::NONE);
         triangles.push(i);
         let tangent = Tangent::new(self.old.sample(i), self.view);
@@ -130,7 +136,9 @@ impl<'a> Around<'a> {
                 triangles.push(k);
             }
         }
-        (others.count == 0 || self.is_inside(&tangent, i, &others, trust)).then_some(triangles)
+        // What moves otherwise may sink into this surface, or come out of it: then an outline moves with neither.
+        let keeps_off = || trust == Trust::Proof || others.iter().all(|k| body_of(k) == body_of(i));
+        (others.count == 0 || keeps_off() && self.is_inside(&tangent, i, &others, trust)).then_some(triangles)
     }
 
     /// The cell that has come to the centre with old sample `i`, if all of it shows the surface of that sample.

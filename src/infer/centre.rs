@@ -194,7 +194,9 @@ impl Centring {
                     (_, mark) => mark.unwrap_or(PixelClass::Good),
                 };
                 // Within a triangle that is lit alike all around there is no more to find out.
-                let centred = if let Some(alike) = alike.at(x, &mut memory) {
+                let centred = if let Some(alike) = alike.at(x, &mut memory)
+                    && (own.is_some() || !basis.is_gap((x, y), alike.source))
+                {
                     basis.take((x, y), alike, &mut row, questions.ask)
                 } else if basis.sources.is_suspect(pixel) {
                     continue;
@@ -288,9 +290,9 @@ impl<R: CastCentres> Basis<'_, R> {
             self.reuse(x, i, &self.old.sample(i), row);
             return Some(());
         }
-        let nearby = || around.known().next().filter(|_| around.known().count() >= ENOUGH_TO_FILL);
-        let i = own.or_else(nearby)?;
-        let candidates = around.surface_of(i, self.trust)?;
+        let is_enough = |&i: &usize| around.known().count() >= ENOUGH_TO_FILL && !self.is_gap((x, y), i);
+        let i = own.or_else(|| around.known().next().filter(is_enough))?;
+        let candidates = around.surface_of(i, self.trust, |k| self.body_of(k))?;
         let candidates = candidates.iter().map(|k| self.old.sample(k));
         let sample = self.rays.nearest_of(x, y, candidates, memory)?;
         self.reuse(x, i, &sample, row);
@@ -299,6 +301,21 @@ impl<R: CastCentres> Basis<'_, R> {
             self.light((x, y), (i, &sample), around, row, questions);
         }
         Some(())
+    }
+
+    /// The body that carries an old sample, if it has moved.
+    fn body_of(&self, i: usize) -> Option<usize> {
+        self.rays.motion()?.body_of(&self.old.sample(i))
+    }
+
+    /// True if a pixel on which nothing landed, and beside which old sample `i` did, is between things that have moved apart: of either
+    /// more may be seen than before.
+    fn is_gap(&self, pixel: (usize, usize), i: usize) -> bool {
+        self.rays.motion().is_some() && {
+            let body = self.body_of(i);
+            let around = Around::new(self.old, self.view, self.sources, pixel, 2);
+            around.known().any(|k| self.body_of(k) != body)
+        }
     }
 
     /// Settles which lights reach `sample`, at the centre of a pixel on the surface of old sample `i`, as far as the samples around

@@ -79,7 +79,7 @@ fn rows_around(buffer: &BuzzBuffer, stretch: &Range<usize>) -> impl Iterator<Ite
 }
 
 /// True if a reused sample may be hidden by what a ray has met at a pixel beside it: something that stands before it and is of no
-/// surface that landed around it. Where none did, anything that is not of its own surface.
+/// surface that landed around it, or moves otherwise. Where none landed, anything that is not of its own surface.
 fn may_be_hidden<R: CastCentres>(pass: &Pass<'_, R>, buffer: &BuzzBuffer, pixel: usize) -> bool {
     let around = || pixels_around(buffer.width(), buffer.height(), pixel);
     let is_unknown = |met: usize| {
@@ -95,6 +95,10 @@ fn may_be_hidden<R: CastCentres>(pass: &Pass<'_, R>, buffer: &BuzzBuffer, pixel:
     };
     let is_met_elsewhere =
         |met: usize| !buffer.class[met].is_reused() && !buffer.is_same_primitive(met, pixel);
+    let body_of =
+        |pixel: usize| pass.basis.rays.motion().and_then(|motion| motion.body_of(&buffer.sample(pixel)));
+    // Of what moves otherwise, a part may come out that was inside of what landed here.
+    let comes_out = |met: usize| body_of(met) != body_of(pixel);
     if !buffer.class[pixel].is_reused() || !is_beside_met(buffer, pixel) {
         return false;
     }
@@ -102,7 +106,9 @@ fn may_be_hidden<R: CastCentres>(pass: &Pass<'_, R>, buffer: &BuzzBuffer, pixel:
         let tangent = Tangent::new(buffer.sample(pixel), pass.basis.view);
         return around().any(|met| is_met_elsewhere(met) && !tangent.is_one_thing_with(&buffer.sample(met)));
     }
-    around().any(|met| is_met_elsewhere(met) && buffer.z[met] < buffer.z[pixel] && is_unknown(met))
+    around().any(|met| {
+        is_met_elsewhere(met) && buffer.z[met] < buffer.z[pixel] && (comes_out(met) || is_unknown(met))
+    })
 }
 
 /// True if a ray was cast at any of the nine pixels around and at `pixel`.

@@ -1,7 +1,7 @@
 //! Cameras that stand still, and scenes that do not.
 
 use crate::rig::{buzz, channels, frames_in, fresh, json, run};
-use crate::stage::{CAMERA, CARD, LAMP, Stage};
+use crate::stage::{CAMERA, CARD, FLOOR, LAMP, Stage};
 use serde_json::Value;
 use std::path::Path;
 
@@ -76,6 +76,20 @@ fn an_object_that_is_switched_on_and_off_leaves_nothing_behind() {
     let mut stage = Stage::new();
     stage.show(CARD, &[true, true, false, false, true, true]);
     assert_inferred_as_traced(&stage);
+}
+
+#[test]
+fn what_sinks_into_a_surface_does_not_show_through_it() {
+    // Whichever of them moves, and whichever frame is the key: one way the floor rises about the ball, the other it comes out.
+    for (node, step) in [(FLOOR, 0.1), (FLOOR, -0.1), (CARD, 0.13), (CARD, -0.13)] {
+        let (folder, out) = fresh();
+        let mut stage = Stage::ball_in_the_floor();
+        stage.translate(node, &(0..8).map(|i| [0.0, step * i as f32, 0.0]).collect::<Vec<_>>());
+        let scene = stage.write(&folder.path().join("s.gltf"));
+        run(&scene, &out, "-r 128x72 --segment 99 --audit").ok();
+        let totals = &json(&out.join("report.json"))["totals"];
+        assert_eq!((&totals["traced_frames"], &totals["hidden"]), (&1.into(), &0.into()), "{node} {step}");
+    }
 }
 
 #[test]

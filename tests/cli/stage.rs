@@ -6,6 +6,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 pub const CAMERA: usize = 0;
+pub const FLOOR: usize = 1;
 pub const CARD: usize = 2;
 pub const LAMP: usize = 3;
 
@@ -67,6 +68,20 @@ impl Stage {
         let mesh = self.push("meshes", json!({"primitives": primitives}));
         let node = self.push("nodes", json!({"mesh": mesh, "translation": [0, 0, 0.5]}));
         self.json["scenes"][0]["nodes"].as_array_mut().unwrap().push(json!(node));
+    }
+
+    /// A ball sunk into the floor to its middle, in place of the card, seen from above.
+    pub fn ball_in_the_floor() -> Self {
+        let mut stage = Self::new();
+        let used = stage.json["extensionsUsed"].as_array_mut().unwrap();
+        used.extend(["KHR_implicit_shapes".into(), "BUZZ_analytic_shape".into()]);
+        let shapes = json!({"shapes": [{"type": "sphere", "sphere": {"radius": 1}}]});
+        stage.json["extensions"]["KHR_implicit_shapes"] = shapes;
+        let ball = json!({"BUZZ_analytic_shape": {"shape": 0, "material": 1}});
+        stage.json["nodes"][CARD]["extensions"] = ball;
+        stage.json["nodes"][CAMERA]["translation"] = json!([0, 3, 6]);
+        stage.json["nodes"][CAMERA]["rotation"] = json!([-0.2164, 0, 0, 0.9763]);
+        stage
     }
 
     /// The camera drifts to the right for `frames` frames.
