@@ -8,7 +8,7 @@
 //! Only what rays meet is rounded: points on surfaces come from the meshes themselves.
 
 use super::tree::{Bounds, Part, Tree};
-use super::{Group, place_group};
+use super::{Group, place_group, world_from_object};
 use crate::scene::{Pose, Scene};
 use glam::{DAffine3, DVec3};
 
@@ -116,10 +116,6 @@ impl Fused {
         }
         stale
     }
-}
-
-fn world_from_object(group: &Group, pose: &Pose) -> DAffine3 {
-    pose.world_from_node[group.node] * group.node_from_object
 }
 
 /// The box around a group in the world, from those of all meshes; nothing where it has no finite corner.

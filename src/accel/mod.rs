@@ -31,7 +31,7 @@ use deform::{Deformed, affine, is_deformable};
 pub use displaced::{Displaced, Posed};
 pub use frustum::Frustum;
 use fused::Fused;
-use glam::{Affine3A, DAffine3, DVec3, Mat3A, Vec3, Vec3A, Vec4};
+use glam::{Affine3A, DAffine3, DMat3, DVec3, Mat3A, Vec3, Vec3A, Vec4};
 pub use intersect::{PreparedRay, Ray, RayHit, Sides};
 pub use known::KnownTriangles;
 use placed_shape::PlacedShape;
@@ -155,7 +155,7 @@ impl Accel {
     /// Places the instances as `pose` has them, relative to `origin`, and poses skinned and morphed meshes (their
     /// trees are rebuilt where their shape has changed; those of static ones never).
     ///
-    /// Instances that are hidden, or whose transform is singular, are not placed.
+    /// Instances that are hidden, or whose transform leaves no more than a line of them, are not placed.
     pub fn place(&mut self, scene: &Scene, pose: &Pose, origin: DVec3) {
         self.origin = origin;
         let deformed = self.deform(scene, pose);
@@ -353,10 +353,29 @@ fn group(scene: &Scene) -> (Vec<Group>, Vec<Vec<usize>>) {
     (groups, trees)
 }
 
+/// How thick what is flat becomes, of how large it is: single precision can still invert that.
+const THIN: f64 = 1e-6;
+
+/// Where a group stands in the world. What a scale of 0 has made flat is thin, so that it can be met; what is a line or a point is not.
+fn world_from_object(group: &Group, pose: &Pose) -> DAffine3 {
+    let mut m = pose.world_from_node[group.node] * group.node_from_object;
+    let DMat3 { x_axis, y_axis, z_axis } = m.matrix3;
+    // Of a flat one these are the area that it gives to a square, times the normals of both.
+    let cofactors = DMat3::from_cols(y_axis.cross(z_axis), z_axis.cross(x_axis), x_axis.cross(y_axis));
+    let area =
+        DVec3::new(cofactors.x_axis.length(), cofactors.y_axis.length(), cofactors.z_axis.length()).length();
+    let longest = x_axis.length().max(y_axis.length()).max(z_axis.length());
+    let (volume, side) = (m.matrix3.determinant(), area.sqrt());
+    if area > THIN * longest * longest && volume.abs() < THIN * area * side {
+        m.matrix3 += cofactors * (THIN / side * if volume < 0.0 { -1.0 } else { 1.0 });
+    }
+    m
+}
+
 fn place_group(scene: &Scene, group: &Group, pose: &Pose, origin: DVec3) -> Placement {
     let visible = pose.visible.get(group.node).copied().unwrap_or(false);
     let skinned = group.instances.first().is_some_and(|&i| scene.instances[i as usize].skin.is_some());
-    let mut m = pose.world_from_node[group.node] * group.node_from_object;
+    let mut m = world_from_object(group, pose);
     let winding = if m.matrix3.determinant() < 0.0 { -1.0 } else { 1.0 };
     if skinned {
         return Placement { present: visible, winding, ..Placement::default() };

@@ -50,20 +50,31 @@ fn broken_triangles_are_as_if_they_were_not_there() {
         // A point, a line, and a triangle that is there twice.
         mesh.triangles.extend([[zero[0]; 3], [zero[0], zero[1], zero[1]], zero]);
     }
-    let flat = Vec3::new(1.0, 0.0, 1.0);
-    for scale in [DVec3::new(1.0, 0.0, 1.0), DVec3::new(0.0, 0.0, 1.0), DVec3::ZERO] {
-        add(&mut scene, Mesh::uv_sphere(1.0, 16, 0), flat, DAffine3::from_scale(scale));
+    let pink = Vec3::new(1.0, 0.0, 1.0);
+    for scale in [DVec3::new(0.0, 0.0, 1.0), DVec3::ZERO] {
+        add(&mut scene, Mesh::uv_sphere(1.0, 16, 0), pink, DAffine3::from_scale(scale));
     }
     let (broken, whole) = (drift(scene, STEP, 9), drift(still_life(), STEP, 9));
     for quality in INFERRING {
         let (a, b) = (
-            measure("points, lines, doubles, flattened nodes", &broken, quality, SIZE),
+            measure("points, lines, doubles, nodes of scale 0", &broken, quality, SIZE),
             measure("the same without them", &whole, quality, SIZE),
         );
         let name = quality.name();
         let near = a.worst.min(SAME) > b.worst.min(SAME) - 0.5 && a.saved > b.saved - 0.01;
         assert!(near, "{name}: {a:?}, {b:?}");
     }
+}
+
+#[test]
+fn what_a_scale_of_0_has_made_flat_is_seen() {
+    let mut scene = still_life();
+    let tilted = DQuat::from_rotation_x(0.6);
+    for (x, scale) in [(-1.5, DVec3::new(1.0, 0.0, 1.0)), (1.5, DVec3::new(0.7, 1.0, 1e-12))] {
+        let place = DAffine3::from_scale_rotation_translation(scale, tilted, DVec3::new(x, 1.6, 0.5));
+        add(&mut scene, Mesh::uv_sphere(1.0, 16, 0), Vec3::new(0.8, 0.2, 0.6), place);
+    }
+    assert_good("nodes of scale 0 along one axis", &drift(scene, STEP, 9), SIZE, 0.4);
 }
 
 /// A floor of `count` slivers, each ten metres long and as thin as that makes it.

@@ -1,6 +1,7 @@
 //! The tracer against arithmetic: scenes whose radiance is known, and facts that hold for all.
 
 mod eye;
+mod flat;
 mod hidden;
 mod light;
 mod rig;
