@@ -3,6 +3,7 @@
 //! Every message is one line that names the file and the element and says what to do. The exit code of the
 //! program follows from the variant (see [`Error::exit_code`]).
 
+use std::io;
 use std::path::PathBuf;
 
 /// Result of everything in this crate that can fail.
@@ -59,6 +60,15 @@ impl Error {
         Self::Output { file: file.into(), message: message.into() }
     }
 
+    /// An [`Error::Input`] where the JSON in `file` cannot be read.
+    pub fn json(file: impl Into<PathBuf>, error: &serde_json::Error, advice: &str) -> Self {
+        let place = format!("line {} column {}", error.line(), error.column());
+        // The place stands before the message already.
+        let said = error.to_string();
+        let why = said.strip_suffix(&format!(" at {place}")).unwrap_or(&said);
+        Self::input(file, place, format!("{why}; {advice}"))
+    }
+
     /// The program's exit code: 1 a frame failed, 2 usage, 3 input, 4 output, 130 and 143 interrupted.
     pub fn exit_code(&self) -> u8 {
         match self {
@@ -69,4 +79,13 @@ impl Error {
             Self::Interrupted { signal } => (128 + signal) as u8,
         }
     }
+}
+
+/// What went wrong, without the system's number for it.
+pub fn reason(error: &io::Error) -> String {
+    if error.kind() == io::ErrorKind::NotFound {
+        return "there is no such file".into();
+    }
+    let said = error.to_string();
+    said.split(" (os error ").next().unwrap_or_default().to_owned()
 }

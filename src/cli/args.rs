@@ -1,5 +1,6 @@
 //! Arguments as typed.
 
+use super::parse;
 use buzz::sequence::Settings;
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use std::path::PathBuf;
@@ -40,7 +41,7 @@ pub struct ConvertArgs {
     /// The scene: .gltf, .glb, or .obj (with --camera-from or --turntable).
     #[arg(required = true)]
     pub input: Option<PathBuf>,
-    /// Folder for the EXR sequence and report.json.
+    /// Folder for the EXR sequence and report.json; made with all above it if it is not there.
     #[arg(required = true)]
     pub out_dir: Option<PathBuf>,
     #[command(flatten)]
@@ -174,7 +175,7 @@ pub struct RenderArgs {
 
 #[derive(Debug, Args)]
 pub struct OutputArgs {
-    /// Frames: 1-100, 1-100x2, 1-10,20-30, -3--1, 1-20&10-30 (those in both) [default: the scene's own range].
+    /// Frames: 1-100, 1-100x2 or 1-100:2 (every second), 1-10,20-30, -3--1, 1-20&10-30 (those in both) [default: the scene's own range].
     #[arg(short, long, allow_hyphen_values = true)]
     pub frames: Option<String>,
     /// Render only this part: x,y,width,height in pixels of the full frame.
@@ -184,7 +185,7 @@ pub struct OutputArgs {
     #[arg(long)]
     pub transparent: bool,
     /// Stops applied to the colour channels.
-    #[arg(long, default_value_t = 0.0, allow_negative_numbers = true)]
+    #[arg(long, default_value_t = 0.0, allow_negative_numbers = true, value_parser = parse::stops)]
     pub exposure: f32,
     /// Depth of reflection and refraction.
     #[arg(long, default_value_t = 4, allow_negative_numbers = true, value_parser = clap::value_parser!(u32).range(..=64))]
@@ -193,10 +194,10 @@ pub struct OutputArgs {
     #[arg(long, value_name = "LEVELS", default_value_t = 1, allow_negative_numbers = true, value_parser = clap::value_parser!(u32).range(1..=i64::from(Settings::MOST_LEVELS)))]
     pub aa: u32,
     /// Render a pair of eyes so far apart, metres, about each camera: a file for the left and one for the right.
-    #[arg(long, value_name = "DISTANCE", allow_negative_numbers = true)]
+    #[arg(long, value_name = "DISTANCE", allow_negative_numbers = true, value_parser = parse::metres)]
     pub stereo: Option<f64>,
     /// Distance of what both eyes see at the same place, metres [default: infinite, parallel eyes].
-    #[arg(long, value_name = "DISTANCE", requires = "stereo", allow_negative_numbers = true)]
+    #[arg(long, value_name = "DISTANCE", requires = "stereo", allow_negative_numbers = true, value_parser = parse::metres)]
     pub convergence: Option<f64>,
     /// Cast a ray to every reused sample and report how many are hidden (slow).
     #[arg(long)]
@@ -212,7 +213,7 @@ pub struct OutputArgs {
     /// name is put before the number.
     #[arg(long, value_name = "PATTERN")]
     pub name: Option<String>,
-    /// Keep the frames that are there and complete; render the others.
+    /// Keep the frames that are there, complete and of this scene and these settings; render the others, and replace those of other ones.
     #[arg(long, conflicts_with = "overwrite")]
     pub skip_existing: bool,
     /// Replace the frames that are there.

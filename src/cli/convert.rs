@@ -6,7 +6,7 @@ use super::existing::{
     report_files,
 };
 use super::interrupt::Interrupt;
-use super::job::{Job, stem, warn_of_ignored};
+use super::job::{Job, refuse_reversed, stem, warn_of_ignored};
 use super::plan_file::PlanFile;
 use super::progress::{Progress, Work};
 use super::say;
@@ -53,6 +53,7 @@ pub fn run(args: ConvertArgs) -> Result<ExitCode> {
     let folder = claim_folder(&request, names, &job)?;
     let mut warnings = Warnings::default();
     warnings.of_no_locks(&folder);
+    warnings.of_eyes_far_apart(job.settings.stereo);
 
     memory::refuse_planning_over(memory_limit, &job)?;
     let planning = Instant::now();
@@ -87,7 +88,8 @@ pub fn run(args: ConvertArgs) -> Result<ExitCode> {
     };
     let mut sink = ExrSink::new(folder, options)?;
     let frames = to_render.iter().flat_map(|&f| pictures_of(f, &job.settings)).count();
-    let work = Work { frames, on_the_way: plan.on_the_way(&to_render) };
+    let on_the_way = plan.on_the_way(&to_render);
+    let work = Work { frames, on_the_way };
     // Its clock tells how long frames take: it begins with them.
     let progress = Progress::new(args.output.progress, work, interrupt);
     let mut recorder = Recorder { progress, records: kept, on_the_way: 0.0 };
@@ -113,7 +115,7 @@ pub fn run(args: ConvertArgs) -> Result<ExitCode> {
     });
     let report = report(input, hash, &job, &plan, records, (runs, warnings.given));
     write_report(&report, &request, &job, sink.folder().names(), &thumbnails)?;
-    say::result(&summary(&report))?;
+    say::result(&summary(&report, on_the_way, &request.report.with_extension("html")))?;
     Ok(ExitCode::SUCCESS)
 }
 
@@ -122,6 +124,7 @@ fn places(args: &ConvertArgs) -> Result<(&Path, &Path)> {
     let (Some(input), Some(out_dir)) = (&args.input, &args.out_dir) else {
         return Err(Error::Usage("INPUT and OUT_DIR are missing".into()).into());
     };
+    refuse_reversed(input, out_dir)?;
     if input.extension().is_none() && !input.exists() {
         let message =
             "there is no such file, nor such a command; commands are plan, inspect, compare and trade";

@@ -135,6 +135,22 @@ pub fn warn_of_ignored(scene: &Scene) {
     }
 }
 
+/// An error if the scene stands where the output folder is to be named.
+pub fn refuse_reversed(input: &Path, out_dir: &Path) -> Result<()> {
+    let is_scene = |path: &Path| {
+        let extension = path.extension().unwrap_or_default().to_ascii_lowercase();
+        path.is_file() && ["gltf", "glb", "obj"].iter().any(|scene| extension == *scene)
+    };
+    if !input.is_file() && is_scene(out_dir) {
+        let message = format!(
+            "is no file, but {} is a scene; is the order reversed? INPUT comes first, then OUT_DIR",
+            out_dir.display()
+        );
+        return Err(Error::input(input, "file", message).into());
+    }
+    Ok(())
+}
+
 /// The stem of the input's name, for the frames' names.
 pub fn stem(input: &Path) -> String {
     input.file_stem().map_or_else(|| "frame".to_owned(), |s| s.to_string_lossy().into_owned())
@@ -188,7 +204,8 @@ fn find_camera(scene: &Scene, name: &str) -> Result<usize> {
     let by_index = || name.parse::<usize>().ok().filter(|&i| i < scene.cameras.len());
     by_name.or_else(by_index).ok_or_else(|| {
         let names: Vec<String> =
-            scene.cameras.iter().enumerate().map(|(i, c)| format!("{i} {}", c.name)).collect();
-        Error::Usage(format!("--camera {name}: the scene has {}", names.join(", "))).into()
+            scene.cameras.iter().enumerate().map(|(i, c)| format!("{i} ({})", c.name)).collect();
+        Error::Usage(format!("--camera {name}: there is no such camera; there are {}", names.join(", ")))
+            .into()
     })
 }

@@ -20,7 +20,7 @@ mod warnings;
 
 use anyhow::Result;
 use args::{Cli, Command};
-use clap::Parser;
+use clap::{CommandFactory, Parser};
 use std::process::ExitCode;
 #[cfg(unix)]
 use std::sync::Arc;
@@ -77,7 +77,18 @@ fn one_line(text: &str) -> String {
     let is_idle = |l: &str| l.is_empty() || l.starts_with("tip:") && l.contains("as a value");
     let useful = lines.filter(|l| !is_idle(l));
     let said = useful.collect::<Vec<_>>().join(" ").replace(" tip: ", "; tip: ");
+    if let Some(stray) = stray(&said) {
+        return format!(
+            "unexpected argument '{stray}': there are INPUT, OUT_DIR and options, and lists take commas without spaces"
+        );
+    }
     format!("{}; --help lists all options", said.strip_prefix("error: ").unwrap_or(&said))
+}
+
+/// What stands behind the input and the folder: the parser takes it for a command.
+fn stray(said: &str) -> Option<&str> {
+    let (word, _) = said.strip_prefix("error: the subcommand '")?.split_once("' cannot be used with")?;
+    (!Cli::command().get_subcommands().any(|command| command.get_name() == word)).then_some(word)
 }
 
 #[cfg(test)]

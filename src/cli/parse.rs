@@ -33,10 +33,8 @@ fn frame_list(text: &str, list: &str) -> Result<BTreeSet<i64>> {
     let mut found = BTreeSet::new();
     for part in list.split(',') {
         let (range, step) = match part.split_once(['x', ':']) {
-            Some((range, step)) => {
-                (range, step.trim().parse::<i64>().ok().filter(|&s| s > 0).ok_or_else(error)?)
-            }
-            None => (part, 1),
+            Some((range, step)) => (range, Some(step.trim())),
+            None => (part, None),
         };
         let range = range.trim();
         // The dash that divides is the first one after a digit; any other is a sign.
@@ -44,10 +42,21 @@ fn frame_list(text: &str, list: &str) -> Result<BTreeSet<i64>> {
             .char_indices()
             .skip(1)
             .find(|&(i, c)| c == '-' && range[..i].ends_with(|c: char| c.is_ascii_digit()));
-        let (first, last) = match dash {
-            Some((i, _)) => (&range[..i], &range[i + 1..]),
-            None => (range, range),
+        let (first, last) = match (dash, step) {
+            (Some((i, _)), _) => (&range[..i], &range[i + 1..]),
+            (None, None) => (range, range),
+            (None, Some(step)) => {
+                let bounds = range.parse::<i64>().ok().zip(step.parse().ok());
+                let meant = match bounds {
+                    Some((first, last)) if first < last => format!("; was {first}-{last} meant?"),
+                    _ => String::new(),
+                };
+                let wanted = format!("a range before the step, like 1-100x2{meant}");
+                return Err(usage("--frames", text, &wanted));
+            }
         };
+        let is_step = |&step: &i64| step > 0;
+        let step = step.map_or(Ok(1), |s| s.parse().ok().filter(is_step).ok_or_else(error))?;
         let number = |s: &str| s.trim().parse::<i64>().ok().filter(|&n| is_frame_number(n)).ok_or_else(error);
         let (first, last) = (number(first)?, number(last)?);
         if last < first {
@@ -125,17 +134,35 @@ pub fn resolution(text: &str, own: (u32, u32)) -> Result<(u32, u32)> {
 
 /// `x,y,width,height` inside `full`.
 pub fn crop(text: &str, full: (u32, u32)) -> Result<Window> {
-    let error = || usage("--crop", text, &format!("x,y,width,height inside {}x{}", full.0, full.1));
+    let error = || usage("--crop", text, &format!("x,y,width,height in pixels of {}x{}", full.0, full.1));
     let numbers =
         text.split(',').map(|s| s.trim().parse::<u32>().map_err(|_| error())).collect::<Result<Vec<_>>>()?;
     let &[x, y, width, height] = numbers.as_slice() else { return Err(error()) };
-    let fits =
-        |at: u32, size: u32, full: u32| size > 0 && at.checked_add(size).is_some_and(|end| end <= full);
-    if fits(x, width, full.0) && fits(y, height, full.1) {
-        Ok(Window { x, y, width, height })
-    } else {
-        Err(error())
+    if width == 0 || height == 0 {
+        return Err(error());
     }
+    let over = |at: u32, size: u32, full: u32| (u64::from(at) + u64::from(size)).saturating_sub(full.into());
+    let sides = [(over(x, width, full.0), "right edge"), (over(y, height, full.1), "lower edge")];
+    let beyond: Vec<String> = sides
+        .iter()
+        .filter(|(pixels, _)| *pixels > 0)
+        .map(|(pixels, side)| format!("{pixels} pixels beyond the {side}"))
+        .collect();
+    if beyond.is_empty() {
+        return Ok(Window { x, y, width, height });
+    }
+    let reaches = beyond.join(" and ");
+    Err(Error::Usage(format!("--crop {text}: reaches {reaches} of the {}x{} frame", full.0, full.1)))
+}
+
+/// A distance as typed.
+pub fn metres(text: &str) -> Result<f64, String> {
+    text.trim().parse().map_err(|_| "expected a number of metres, without a unit".into())
+}
+
+/// An exposure as typed.
+pub fn stops(text: &str) -> Result<f32, String> {
+    text.trim().parse().map_err(|_| "expected a number of stops, without a unit".into())
 }
 
 /// The distances of a stereo pair.
@@ -170,6 +197,9 @@ pub fn aovs(text: &str) -> Result<AovSet> {
             (_, Some((_, aov))) => set = set.with(*aov),
             ("all", _) => set = Aov::ALL.into_iter().collect(),
             ("beauty", _) => set = set.with(Aov::Depth).with(Aov::Class),
+            ("", _) if text.contains(',') => {
+                return Err(Error::Usage(format!("--aov {text}: there is a comma too many")));
+            }
             _ => {
                 let names: Vec<&str> = NAMES.iter().map(|(n, _)| *n).collect();
                 return Err(usage("--aov", name, &format!("one of {}, all, beauty", names.join(", "))));
@@ -222,7 +252,9 @@ mod tests {
         assert_eq!(list("1-4&5-9"), [0; 0]);
         assert_eq!(frames("0-499999,500000-999999&0-999999").unwrap().len(), 1_000_000);
         assert!(frames("0-499999,500000-1000000").unwrap_err().to_string().contains("at most"));
-        for bad in ["1-4&", "&1", "", "a", "5-1", "1-5x0", "1--", "1-99999999999", "--", "1-5x"] {
+        let said = frames("1:5").unwrap_err().to_string();
+        assert!(said.contains("a range before the step") && said.contains("was 1-5 meant?"), "{said}");
+        for bad in ["7x1", "1-4&", "&1", "", "a", "5-1", "1-5x0", "1--", "1-99999999999", "--", "1-5x"] {
             assert!(frames(bad).is_err(), "{bad}");
         }
     }
@@ -268,6 +300,11 @@ mod tests {
             assert!(resolution(bad, (1280, 720)).is_err(), "{bad}");
         }
         assert!(crop("0,0,1280,720", (1280, 720)).is_ok());
+        let said = crop("0,0,1300,721", (1280, 720)).unwrap_err().to_string();
+        assert!(
+            said.contains("20 pixels beyond the right edge and 1 pixels beyond the lower edge"),
+            "{said}"
+        );
         for bad in ["0,0,1281,720", "1,0,1280,1", "0,0,0,1", "0,0,1", "4294967295,0,1,1"] {
             assert!(crop(bad, (1280, 720)).is_err(), "{bad}");
         }

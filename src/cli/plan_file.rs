@@ -1,7 +1,7 @@
 //! A plan as a file: what `plan --format json` prints, and `convert --plan` replays.
 
 use anyhow::Result;
-use buzz::error::Error;
+use buzz::error::{Error, reason};
 use buzz::output::{self, KeyFrame, SegmentRange};
 use buzz::plan::{Plan, Reason, Segment};
 use buzz::scene::Rational;
@@ -33,17 +33,15 @@ impl PlanFile {
 
     /// Reads a plan.
     pub fn read(path: &Path) -> Result<Self> {
-        let fail = |why: String| Error::input(path, "the file", why);
+        let fail = |why: String| Error::input(path, "file", why);
+        let unread = |e: std::io::Error| fail(reason(&e));
         // To open a pipe would wait for whoever writes to it, and a device has no end.
-        if !std::fs::metadata(path).map_err(|e| fail(e.to_string()))?.is_file() {
+        if !std::fs::metadata(path).map_err(unread)?.is_file() {
             return Err(fail("is no file; give it what plan --format json prints".into()).into());
         }
-        let text = std::fs::read(path).map_err(|e| fail(e.to_string()))?;
-        let broken = |e: serde_json::Error| {
-            let place = format!("line {} column {}", e.line(), e.column());
-            Error::input(path, place, format!("{e}; expected what plan --format json prints"))
-        };
-        let mut plan: Self = serde_json::from_slice(&text).map_err(broken)?;
+        let text = std::fs::read(path).map_err(unread)?;
+        let mut plan: Self = serde_json::from_slice(&text)
+            .map_err(|e| Error::json(path, &e, "--plan takes what plan --format json prints"))?;
         plan.path = path.to_owned();
         if plan.schema != Self::SCHEMA {
             let message = format!("is {}, expected {}; make a new plan", plan.schema, Self::SCHEMA);

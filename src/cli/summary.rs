@@ -4,7 +4,7 @@ use super::job::Job;
 use super::progress::Tally;
 use buzz::frame::FrameKind;
 use buzz::infer::BuzzBuffer;
-use buzz::output::{self, FrameRecord, Report, ReportInput, Run, SceneSummary, SettingsHash};
+use buzz::output::{self, FrameRecord, Report, ReportInput, Run, SceneSummary, SegmentRange, SettingsHash};
 use buzz::plan::Plan;
 use buzz::scene::Requirements;
 use buzz::trace::lit_words;
@@ -48,8 +48,8 @@ pub fn report(
     })
 }
 
-/// Three lines: frames, rays saved, where the time went.
-pub fn summary(report: &Report) -> String {
+/// Four lines: frames, rays saved, where the time went, and where the report's `page` is. So many frames were made on the way.
+pub fn summary(report: &Report, made_on_the_way: usize, page: &Path) -> String {
     let totals = &report.totals;
     let frames = match (totals.frames, report.frames.iter().any(|f| f.eye.is_some())) {
         (1, false) => "frame",
@@ -75,20 +75,38 @@ pub fn summary(report: &Report) -> String {
     format!(
         "{} {frames}: {} traced, {} inferred, in {:.1} s{runs}\n{}{hidden}\n\
          seconds: {:.1} reading, {:.1} trees, {:.1} plan,{on_the_way} {:.1} infer, {:.1} trace, {:.1} enhance, \
-         {:.1} write (beside)\n",
+         {:.1} write (beside)\nreport: {}\n",
         totals.frames,
         totals.traced_frames,
         totals.inferred_frames,
         wall,
-        saved.unwrap_or_else(|| {
-            "rays saved unknown: no key frame among these frames that stands for the others".into()
-        }),
+        saved.unwrap_or_else(|| not_known(report, made_on_the_way)),
         s.import,
         s.accel,
         s.plan,
         s.infer,
         s.trace,
         s.enhance,
-        s.write
+        s.write,
+        page.display()
     )
+}
+
+/// Why nobody can tell what part of the rays was saved.
+fn not_known(report: &Report, made_on_the_way: usize) -> String {
+    if report.totals.traced_frames > 0 {
+        return "rays saved: not known, as these frames take more rays than their key frames do".into();
+    }
+    let holds = |s: &&SegmentRange| report.frames.iter().any(|f| (s.first..=s.last).contains(&f.frame));
+    let keys: Vec<String> = report.plan.segments.iter().filter(holds).map(|s| s.key.to_string()).collect();
+    let which = match keys.as_slice() {
+        [key] => format!("their key frame ({key}) is"),
+        keys => format!("their key frames ({}) are", keys.join(", ")),
+    };
+    let on_the_way = match made_on_the_way {
+        0 => String::new(),
+        1 => "; 1 frame was made on the way".into(),
+        made => format!("; {made} frames were made on the way"),
+    };
+    format!("rays saved: not known, as {which} not among these frames{on_the_way}")
 }

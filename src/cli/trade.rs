@@ -3,7 +3,7 @@
 use super::args::{ProgressArg, QualityArg, TradeArgs};
 use super::existing::prepare_files;
 use super::interrupt::Interrupt;
-use super::job::{Job, warn_of_ignored};
+use super::job::{Job, refuse_reversed, warn_of_ignored};
 use super::{memory, parse, say};
 use anyhow::{Context, Result};
 use buzz::error::Error;
@@ -20,6 +20,7 @@ pub const ADVICE: &str =
     "; nothing was written: run it again, with fewer --frames or a lower --resolution if it takes too long";
 
 pub fn run(args: TradeArgs) -> Result<ExitCode> {
+    refuse_reversed(&args.input, &args.out_dir)?;
     let interrupt = Interrupt::watch(ADVICE).context("signals cannot be watched")?;
     let wanted = args.frames.as_deref().map(parse::frames).transpose()?;
     let mut job = Job::new(&args.input, &args.scene, &args.render, QualityArg::Full, None)?;

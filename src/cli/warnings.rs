@@ -3,7 +3,7 @@
 use super::say;
 use buzz::frame::FrameId;
 use buzz::output::OutputFolder;
-use buzz::scene::Timing;
+use buzz::scene::{Stereo, Timing};
 use std::collections::BTreeSet;
 
 /// The warnings that were given.
@@ -39,6 +39,15 @@ impl Warnings {
         if beyond > 0 {
             self.add(format!(
                 "--frames: {beyond} of them are not in the scene's range, {first}-{last}; curves stand still there"
+            ));
+        }
+    }
+
+    /// Of eyes that are further apart than any head's, where millimetres may have been meant.
+    pub fn of_eyes_far_apart(&mut self, stereo: Option<Stereo>) {
+        if let Some(Stereo { interocular, .. }) = stereo.filter(|pair| pair.interocular > 1.0) {
+            self.add(format!(
+                "--stereo {interocular}: {interocular} m between the eyes; it is given in metres, 65 mm are 0.065"
             ));
         }
     }

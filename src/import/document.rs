@@ -6,10 +6,10 @@
 //! Working round it needs a validator as long as this reader, and would still not give the element's pointer.
 
 use super::uri::Folder;
-use crate::{Error, Result};
+use crate::{Error, Result, error::reason};
 use serde_json::{Map, Value};
 use std::{
-    fs,
+    fs, io,
     path::{Path, PathBuf},
     rc::Rc,
 };
@@ -48,9 +48,9 @@ impl Document {
         let (json, binary) =
             if bytes.starts_with(b"glTF") { split_glb(file, &bytes)? } else { (bytes.as_slice(), None) };
         let json = json.strip_prefix(b"\xef\xbb\xbf").unwrap_or(json);
-        let root: Value = serde_json::from_slice(json).map_err(|e| {
-            let place = format!("line {} column {}", e.line(), e.column());
-            Error::input(file, place, format!("not valid JSON ({e}); is this a glTF file? Blender and USD files are exported first (docs/pipeline.md)"))
+        let root: Value = serde_json::from_slice(json).map_err(|e| match other_kind(file, json) {
+            Some(message) => Error::input(file, "file", message),
+            None => Error::json(file, &e, "not valid JSON: is this a glTF file? Copy or export it again"),
         })?;
         let binary = binary.map(|bytes| Rc::new(bytes.to_vec()));
         let document = Self { file: file.to_owned(), folder, root, binary, bytes: size };
@@ -244,6 +244,18 @@ impl<'a> Element<'a> {
     }
 }
 
+/// What to do about a file that is of another kind than glTF; none if it looks like one that is broken.
+fn other_kind(file: &Path, bytes: &[u8]) -> Option<&'static str> {
+    let extension = file.extension().unwrap_or_default().to_ascii_lowercase();
+    if extension == "blend" || bytes.starts_with(b"BLENDER") {
+        Some("is a Blender file; export it as glTF first (docs/pipeline.md)")
+    } else if ["usd", "usda", "usdc", "usdz"].iter().any(|usd| extension == *usd) {
+        Some("is a USD file; export it as glTF first (docs/pipeline.md)")
+    } else {
+        bytes.contains(&0).then_some("is no glTF file; give a .gltf, .glb or .obj")
+    }
+}
+
 /// Reads a regular file; a pipe or device could be endless.
 pub(super) fn read_file(file: &Path) -> Result<Vec<u8>> {
     let failed = |why| Error::input(file, "file", format!("{why}; give the path of a file that may be read"));
@@ -252,7 +264,10 @@ pub(super) fn read_file(file: &Path) -> Result<Vec<u8>> {
 
 /// The bytes of a regular file, or what is wrong with it.
 fn read_regular(file: &Path) -> Result<Vec<u8>, String> {
-    let failed = |e: std::io::Error| format!("cannot be read ({e})");
+    let failed = |e: io::Error| match e.kind() {
+        io::ErrorKind::NotFound => reason(&e),
+        _ => format!("cannot be read ({})", reason(&e)),
+    };
     if !fs::metadata(file).map_err(failed)?.is_file() {
         return Err("is not a regular file".into());
     }

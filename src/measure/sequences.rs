@@ -5,9 +5,10 @@
 
 use super::read::stated_number;
 use crate::output::{NumberInName, number_in_name, numbers_in_name};
-use crate::{Error, Result};
+use crate::{Error, Result, error::reason};
 use std::cmp::Reverse;
 use std::collections::{BTreeMap, HashMap};
+use std::io;
 use std::path::{Path, PathBuf};
 
 /// By the name with # for its number, then by number.
@@ -65,7 +66,14 @@ impl File {
 }
 
 fn files_in(folder: &Path) -> Result<Vec<File>> {
-    let fail = |e: std::io::Error| Error::input(folder, "folder", e.to_string());
+    let fail = |e: io::Error| {
+        let why = match e.kind() {
+            io::ErrorKind::NotFound => "there is no such folder; give one with EXR frames".into(),
+            io::ErrorKind::NotADirectory => "is a file; expected a folder with EXR frames".into(),
+            _ => reason(&e),
+        };
+        Error::input(folder, "folder", why)
+    };
     let mut files = Vec::new();
     for entry in std::fs::read_dir(folder).map_err(fail)? {
         let path = entry.map_err(fail)?.path();

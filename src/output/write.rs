@@ -1,7 +1,7 @@
 //! Files that are whole or not there: written beside their place under another name, forced to disk, then renamed.
 
 use super::temporary::Temporary;
-use crate::{Error, Result};
+use crate::{Error, Result, error::reason};
 use std::collections::HashSet;
 use std::fs::{self, File, OpenOptions, TryLockError};
 use std::io::{self, Write};
@@ -107,6 +107,9 @@ pub(super) fn explain(path: &Path, error: &io::Error) -> Error {
         io::ErrorKind::PermissionDenied | io::ErrorKind::ReadOnlyFilesystem => {
             ": choose a folder that may be written to"
         }
+        io::ErrorKind::NotFound if path.parent().is_some_and(Path::is_dir) => {
+            return Error::output(path, "it cannot be made there; choose another folder");
+        }
         io::ErrorKind::NotFound => ": see whether its folder is there",
         io::ErrorKind::FileTooLarge => ": raise the limit on file sizes, then run again",
         io::ErrorKind::NotADirectory | io::ErrorKind::AlreadyExists => ": it must be a folder",
@@ -116,7 +119,7 @@ pub(super) fn explain(path: &Path, error: &io::Error) -> Error {
         }
         _ => "",
     };
-    Error::output(path, format!("{error}{advice}"))
+    Error::output(path, format!("{}{advice}", reason(error)))
 }
 
 #[cfg(test)]

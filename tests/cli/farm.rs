@@ -285,7 +285,7 @@ fn a_plan_that_does_not_fit_is_refused() {
     let refused = |file: &Path, options: &str, code: i32, parts: &[&str]| {
         run(&scene, &out, &format!("-r 32x18 {options} --plan {}", file.display())).refused(code, parts);
     };
-    refused(&path("none.json"), "", 3, &["none.json", "No such file"]);
+    refused(&path("none.json"), "", 3, &["none.json", "there is no such file"]);
     fs::write(path("broken.json"), "{\"schema\": \"buzz-plan/1\",\n 7}").unwrap();
     refused(&path("broken.json"), "", 3, &["broken.json: line 2", "plan --format json"]);
     let next = attempt("next.json", &|p| p["schema"] = "buzz-plan/2".into());

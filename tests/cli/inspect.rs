@@ -47,7 +47,7 @@ fn frames_and_cameras_are_those_that_are_asked_for() {
     assert!(said.contains("frames 1001-1004 ") && said.contains("camera 0: Cam (chosen)\n"), "{said}");
     let said: Value = serde_json::from_str(&inspect("--camera 0 --format json").ok().out).unwrap();
     assert_eq!((&said["frames"], &said["camera"]), (&serde_json::json!([0, 3]), &0.into()));
-    inspect("--camera Nobody").refused(2, &["--camera Nobody", "0 Cam"]);
+    inspect("--camera Nobody").refused(2, &["--camera Nobody: there is no such camera", "0 (Cam)"]);
     inspect("--start-frame 9999999999").refused(2, &["--start-frame"]);
 }
 

@@ -224,6 +224,7 @@ fn frames_outside_of_the_range_are_rendered_and_warned_of() {
 fn frames_on_the_way_are_told_and_counted() {
     let (_folder, out) = fresh();
     let said = run(&courtyard(), &out, "-r 32x18 -f 0 --progress plain").ok();
+    assert!(said.out.contains("not known, as their key frame (") && said.out.contains("made on the way"));
     let lines = said.err.lines().filter(|l| l.contains("on the way, ")).count();
     assert!(lines > 0 && said.err.lines().all(|l| l.starts_with("frame ")), "{}", said.err);
     assert!(said.out.contains("frames on the way"), "{}", said.out);

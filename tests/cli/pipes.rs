@@ -10,9 +10,10 @@ fn results_go_to_standard_output_and_progress_to_standard_error() {
     let scene = Stage::drifting(4).write(&folder.path().join("s.gltf"));
     let plain = run(&scene, &out, "-r 32x18").ok();
     let summary: Vec<&str> = plain.out.lines().collect();
-    assert_eq!(summary.len(), 3, "{}", plain.out);
+    assert_eq!(summary.len(), 4, "{}", plain.out);
     assert!(summary[0].starts_with("4 frames: 1 traced, 3 inferred, in "), "{}", summary[0]);
     assert!(summary[1].ends_with(" of camera and shadow rays saved") && summary[2].starts_with("seconds: "));
+    assert_eq!(summary[3], format!("report: {}", out.join("report.html").display()));
     assert_eq!(plain.err.lines().count(), 4);
     assert!(plain.err.lines().all(|l| l.starts_with("frame ") && l.contains(" left")), "{}", plain.err);
 
@@ -33,7 +34,7 @@ fn open_job_description_reads_its_messages_on_standard_output() {
     assert_eq!(progress, ["25.0", "50.0", "75.0", "100.0"]);
     let status: Vec<&str> = out.lines().filter_map(|l| l.strip_prefix("openjd_status: frame ")).collect();
     assert!(status.len() == 4 && status.iter().all(|s| s.ends_with(" left")), "{status:?}");
-    assert_eq!(out.lines().count(), 4 + 4 + 3);
+    assert_eq!(out.lines().count(), 4 + 4 + 4);
 }
 
 /// A reader that goes away before the first byte is no error, and no panic.

@@ -13,6 +13,8 @@ fn input_that_cannot_be_rendered_is_refused_with_3() {
     fs::write(path("noise.glb"), [7; 100]).unwrap();
     fs::write(path("walk.fbx"), "Kaydara FBX Binary").unwrap();
     fs::create_dir(path("folder.gltf")).unwrap();
+    fs::write(path("shot.blend"), b"BLENDER-v405").unwrap();
+    fs::write(path("shot.png"), b"\x89PNG\r\n\x1a\n\0\0\0").unwrap();
     let mut stage = Stage::drifting(2);
     stage.json["extensionsUsed"].as_array_mut().unwrap().push("EXT_nobody_knows".into());
     stage.json["extensionsRequired"] = serde_json::json!(["EXT_nobody_knows"]);
@@ -22,9 +24,11 @@ fn input_that_cannot_be_rendered_is_refused_with_3() {
     stage.json.as_object_mut().unwrap().remove("cameras");
     stage.write(&path("blind.gltf"));
     for (name, parts) in [
-        ("missing.gltf", ["No such file", "give the path"]),
+        ("missing.gltf", ["there is no such file; give the path", "missing.gltf"]),
         ("folder.gltf", ["folder.gltf", "not a regular file"]),
         ("walk.fbx", ["walk.fbx", "glTF"]),
+        ("shot.blend", ["shot.blend: file: is a Blender file", "pipeline.md"]),
+        ("shot.png", ["shot.png: file: is no glTF file", ".glb"]),
         ("broken.gltf", ["broken.gltf", "line 1 column"]),
         ("empty.gltf", ["empty.gltf", "JSON"]),
         ("noise.glb", ["noise.glb", ""]),
@@ -33,7 +37,41 @@ fn input_that_cannot_be_rendered_is_refused_with_3() {
     ] {
         run(&path(name), &out, "-r 8x8").refused(3, &parts);
         let scene = path(name);
-        buzz(["plan", scene.to_str().unwrap(), "-r", "8x8"]).refused(3, &parts);
+        let said = buzz(["plan", scene.to_str().unwrap(), "-r", "8x8"]).refused(3, &parts).err;
+        assert!(said.matches("column").count() < 2 && !said.contains("os error"), "{said}");
+    }
+    assert!(!out.exists());
+}
+
+#[test]
+fn a_scene_where_the_output_folder_is_named_is_told_from_a_missing_one() {
+    let (folder, out) = fresh();
+    let scene = Stage::drifting(2).write(&folder.path().join("s.gltf"));
+    let reversed = ["is the order reversed? INPUT comes first", "s.gltf"];
+    for input in [&out, folder.path()] {
+        run(input, &scene, "").refused(3, &reversed);
+        buzz(["trade".as_ref(), input.as_os_str(), scene.as_os_str()]).refused(3, &reversed);
+    }
+}
+
+#[test]
+fn what_is_nearly_right_is_told_what_is_wrong() {
+    let (folder, out) = fresh();
+    let scene = Stage::drifting(2).write(&folder.path().join("s.gltf"));
+    for (options, said) in [
+        ("-f 0:5", "was 0-5 meant?"),
+        (
+            "--crop 0,0,100,40",
+            "36 pixels beyond the right edge and 4 pixels beyond the lower edge of the 64x36",
+        ),
+        ("--aov lights,", "--aov lights,: there is a comma too many"),
+        ("--stereo 6.5cm", "expected a number of metres, without a unit"),
+        ("--stereo 0.1 --convergence 2m", "expected a number of metres, without a unit"),
+        ("--exposure 2stops", "expected a number of stops, without a unit"),
+        ("--aov crypto normal", "unexpected argument 'normal'"),
+        ("-- -f 0-3", "unexpected argument '-f'"),
+    ] {
+        run(&scene, &out, &format!("-r 64x36 {options}")).refused(2, &[said]);
     }
     assert!(!out.exists());
 }
@@ -205,6 +243,7 @@ fn comparisons_tell_what_they_miss() {
     };
     compare(&folder.path().join("none"), &out, "").refused(3, &["none"]);
     compare(&out, &folder.path().join("none"), "").refused(3, &["none"]);
+    compare(&scene, &out, "").refused(3, &["s.gltf", "expected a folder with EXR frames"]);
     let empty = folder.path().join("empty");
     fs::create_dir(&empty).unwrap();
     compare(&out, &empty, "").refused(3, &["no EXR"]);

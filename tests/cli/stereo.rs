@@ -118,3 +118,15 @@ fn what_has_no_parallax_is_refused() {
     }
     assert!(!out.exists());
 }
+
+#[test]
+fn eyes_that_are_metres_apart_are_warned_of_once() {
+    let (folder, out) = fresh();
+    let scene = Stage::drifting(2).write(&folder.path().join("s.gltf"));
+    let said = |eyes: &str| {
+        run(&scene, &out, &format!("-r 16x9 --overwrite --progress none --stereo {eyes}")).ok().err
+    };
+    assert_eq!(said("0.065"), "");
+    let far = said("65");
+    assert!(far.lines().count() == 1 && far.contains("--stereo 65: 65 m between the eyes"), "{far}");
+}
