@@ -168,7 +168,8 @@ quality).
 
 *ms a frame* is without writing, key frames counted in. *Times as fast* is against `full`. *Hidden* is the share of
 reused samples that another surface hides. PSNR, FLIP and *over 5 %* are of frames that are not identical to the
-truth, compared as `buzz-convert compare` does.
+truth, compared as `buzz-convert compare` does. Frames that are nearly exact lift a mean
+of dB: look at *worst dB*, too.
 
 *Interpolated* is the baseline without a renderer: every fourth frame is traced, optical flow makes the three between
 (`ffmpeg`'s `minterpolate`, `scenes/interpolate.py`). Its error is that of the made frames among those measured; its
