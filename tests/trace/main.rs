@@ -3,6 +3,7 @@
 mod eye;
 mod flat;
 mod hidden;
+mod instances;
 mod light;
 mod rig;
 mod robust;

@@ -1,6 +1,6 @@
 //! Scenes made in memory, placed and ready to trace.
 
-use buzz::accel::Accel;
+use buzz::accel::{Accel, Ray};
 use buzz::frame::{RayCounts, SurfaceSample};
 use buzz::scene::{LightKind, Material, Mesh, Pose, Scene, View};
 use buzz::trace::{Radiance, TraceOptions, Tracer};
@@ -125,4 +125,40 @@ pub fn upside_down(y: f64) -> DAffine3 {
 /// A light straight above that shines down with 1 W/m2.
 pub fn add_sun(scene: &mut Scene) -> usize {
     scene.add_light(LightKind::Directional, 1.0, down_from(0.0, 0.0, 0.0))
+}
+
+pub fn ray(origin: Vec3, direction: Vec3, t_max: f32) -> Ray {
+    Ray { origin, direction, t_min: 0.0, t_max }
+}
+
+/// A rolling ground of `n` x `n` squares around the origin, made of exact and of rough coordinates.
+pub fn ground(n: u32, rough: bool) -> Mesh {
+    let height = |x: u32, z: u32| if rough { ((x * 7 + z * 13) % 11) as f32 * 0.0371 } else { 0.0 };
+    let step = if rough { 0.317 } else { 1.0 };
+    let mut mesh = Mesh::default();
+    for z in 0..=n {
+        for x in 0..=n {
+            let half = n as f32 / 2.0;
+            mesh.positions.push(Vec3::new((x as f32 - half) * step, height(x, z), (z as f32 - half) * step));
+        }
+    }
+    for z in 0..n {
+        for x in 0..n {
+            let a = z * (n + 1) + x;
+            let (b, c, d) = (a + 1, a + n + 1, a + n + 2);
+            mesh.triangles.extend([[a, c, b], [b, c, d]]);
+        }
+    }
+    mesh
+}
+
+pub fn placed(mesh: Mesh, world_from_object: DAffine3) -> (Scene, Pose, Accel) {
+    let mut scene = Scene::default();
+    scene.add_material(Material::default());
+    let mesh = scene.add_mesh(mesh);
+    scene.add_instance(mesh, world_from_object);
+    let pose = scene.pose(0.0);
+    let mut accel = Accel::new(&scene);
+    accel.place(&scene, &pose, DVec3::ZERO);
+    (scene, pose, accel)
 }

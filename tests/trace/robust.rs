@@ -1,47 +1,11 @@
 //! Facts that hold for every scene: nothing leaks, nothing is not a number, nothing depends on where the world is.
 
 use crate::rig::*;
-use buzz::accel::{Accel, Ray, Sides};
+use buzz::accel::Sides;
 use buzz::frame::RayCounts;
-use buzz::scene::{LightKind, Material, Mesh, Outline, Pose, Scene, Skin};
-use glam::{DAffine3, DMat4, DQuat, DVec3, Vec2, Vec3, Vec4};
+use buzz::scene::{LightKind, Material, Mesh, Outline, Scene};
+use glam::{DAffine3, DQuat, DVec3, Vec2, Vec3, Vec4};
 use proptest::prelude::*;
-
-fn ray(origin: Vec3, direction: Vec3, t_max: f32) -> Ray {
-    Ray { origin, direction, t_min: 0.0, t_max }
-}
-
-/// A rolling ground of `n` x `n` squares around the origin, made of exact and of rough coordinates.
-fn ground(n: u32, rough: bool) -> Mesh {
-    let height = |x: u32, z: u32| if rough { ((x * 7 + z * 13) % 11) as f32 * 0.0371 } else { 0.0 };
-    let step = if rough { 0.317 } else { 1.0 };
-    let mut mesh = Mesh::default();
-    for z in 0..=n {
-        for x in 0..=n {
-            let half = n as f32 / 2.0;
-            mesh.positions.push(Vec3::new((x as f32 - half) * step, height(x, z), (z as f32 - half) * step));
-        }
-    }
-    for z in 0..n {
-        for x in 0..n {
-            let a = z * (n + 1) + x;
-            let (b, c, d) = (a + 1, a + n + 1, a + n + 2);
-            mesh.triangles.extend([[a, c, b], [b, c, d]]);
-        }
-    }
-    mesh
-}
-
-fn placed(mesh: Mesh, world_from_object: DAffine3) -> (Scene, Pose, Accel) {
-    let mut scene = Scene::default();
-    scene.add_material(Material::default());
-    let mesh = scene.add_mesh(mesh);
-    scene.add_instance(mesh, world_from_object);
-    let pose = scene.pose(0.0);
-    let mut accel = Accel::new(&scene);
-    accel.place(&scene, &pose, DVec3::ZERO);
-    (scene, pose, accel)
-}
 
 #[test]
 fn slivers_throw_no_shadow_on_each_other() {
@@ -274,94 +238,6 @@ fn tiny_scenes_are_met_as_well_as_large_ones() {
         let eye = Vec3::new(0.0, 0.0, 1.001) * scale as f32;
         assert!(accel.intersect(&scene, &ray(eye, Vec3::NEG_Z, f32::INFINITY), Sides::Visible).is_some());
     }
-}
-
-#[test]
-fn moved_hidden_and_deformed_instances_are_met_where_they_are() {
-    let mut scene = Scene::default();
-    scene.add_material(Material::default());
-    let mut plane = Mesh::plane(1.0, 0);
-    plane.morph_targets =
-        vec![buzz::scene::MorphTarget { positions: vec![Vec3::Y; 4], ..Default::default() }];
-    let morphed = scene.add_mesh(plane.clone());
-    plane.morph_targets.clear();
-    plane.joints = vec![vec![[0, 0, 0, 0]; 4]];
-    plane.joint_weights = vec![vec![[1.0, 0.0, 0.0, 0.0]; 4]];
-    let skinned = scene.add_mesh(plane);
-    scene.add_instance(morphed, at(0.0, 0.0, 0.0));
-    let bound = scene.add_instance(skinned, at(55.0, 0.0, 0.0));
-    let joint = scene.add_node("joint", at(10.0, 2.0, 0.0));
-    scene.skins.push(Skin { joints: vec![joint], inverse_bind: vec![DMat4::from_scale(DVec3::splat(2.0))] });
-    scene.instances[bound].skin = Some(0);
-
-    let mut accel = Accel::new(&scene);
-    let mut pose = scene.pose(0.0);
-    let height = |accel: &mut Accel, pose: &Pose, origin: DVec3, x: f64| {
-        accel.place(&scene, pose, origin);
-        let eye = (DVec3::new(x, 9.0, 0.3) - origin).as_vec3();
-        let hit = accel.intersect(&scene, &ray(eye, Vec3::NEG_Y, 99.0), Sides::Visible)?;
-        let point = accel.surface_point(&scene, hit.surface);
-        Some(((point.as_dvec3() + origin).y * 100.0).round() / 100.0)
-    };
-    pose.weights[scene.instances[0].node] = vec![0.25];
-    assert_eq!(height(&mut accel, &pose, DVec3::ZERO, 0.2), Some(0.25));
-    assert_eq!(height(&mut accel, &pose, DVec3::splat(3.0), 0.2), Some(0.25));
-    pose.weights[scene.instances[0].node] = vec![3.0];
-    assert_eq!(height(&mut accel, &pose, DVec3::ZERO, 0.2), Some(3.0));
-    assert_eq!(height(&mut accel, &pose, DVec3::ZERO, 11.9), Some(2.0), "a joint of twice the size");
-    assert_eq!(
-        height(&mut accel, &pose, DVec3::ZERO, 55.0),
-        None,
-        "where its own node is counts for nothing"
-    );
-    pose.world_from_node[joint] = at(10.0, 5.0, 0.0);
-    assert_eq!(height(&mut accel, &pose, DVec3::splat(-2.0), 11.9), Some(5.0));
-    pose.visible[scene.instances[0].node] = false;
-    assert_eq!(height(&mut accel, &pose, DVec3::ZERO, 0.2), None);
-}
-
-#[test]
-fn what_is_morphed_alike_is_in_memory_once() {
-    let memory = |instances: usize, weight: fn(usize) -> f32| {
-        let mut scene = Scene::default();
-        scene.add_material(Material::default());
-        let mut ball = Mesh::uv_sphere(1.0, 32, 0);
-        let positions = vec![Vec3::Y; ball.positions.len()];
-        ball.morph_targets = vec![buzz::scene::MorphTarget { positions, ..Default::default() }];
-        let ball = scene.add_mesh(ball);
-        for i in 0..instances {
-            let instance = scene.add_instance(ball, at(3.0 * i as f64, 0.0, 0.0));
-            scene.nodes[scene.instances[instance].node].weights = vec![weight(i)];
-        }
-        let mut accel = Accel::new(&scene);
-        accel.place(&scene, &scene.pose(0.0), DVec3::ZERO);
-        accel.memory_bytes()
-    };
-    let one = memory(1, |_| 0.0);
-    assert!(memory(50, |_| 0.0) < 2 * one && memory(50, |_| 0.5) < 2 * one);
-    assert!(memory(50, |i| i as f32) > 40 * one);
-}
-
-#[test]
-fn what_was_thought_to_stand_still_is_met_where_a_pose_puts_it() {
-    let mut scene = Scene::default();
-    for x in [0.0, 5.0, 10.0] {
-        add_plane(&mut scene, matt(Vec3::ONE), 1.0, at(x, 0.0, 0.0));
-    }
-    let mut pose = scene.pose(0.0);
-    let mut accel = Accel::new(&scene);
-    let height = |accel: &mut Accel, pose: &Pose, x: f32| {
-        accel.place(&scene, pose, DVec3::ZERO);
-        let hit = accel.intersect(&scene, &ray(Vec3::new(x, 9.0, 0.3), Vec3::NEG_Y, 99.0), Sides::Visible)?;
-        Some((accel.surface_point(&scene, hit.surface).y, 9.0 - hit.t))
-    };
-    assert_eq!(height(&mut accel, &pose, 5.2), Some((0.0, 0.0)));
-    pose.world_from_node[1] = at(5.0, 2.0, 0.0);
-    assert_eq!(height(&mut accel, &pose, 5.2), Some((2.0, 2.0)));
-    assert_eq!(height(&mut accel, &pose, 9.8), Some((0.0, 0.0)));
-    pose.visible[1] = false;
-    assert_eq!(height(&mut accel, &pose, 5.2), None);
-    assert_eq!(height(&mut accel, &pose, 0.2), Some((0.0, 0.0)));
 }
 
 /// Möller-Trumbore in double precision.
