@@ -25,8 +25,8 @@ pub(super) const STACK: [PixelClass; PixelClass::COUNT] = [
     PixelClass::Traced,
 ];
 
-/// Colours of the classes: as in [`crate::measure::picture::CLASS_COLORS`], but that unchanged pixels are light or dark
-/// with the page.
+/// Colours of the classes: as in [`crate::measure::picture::CLASS_COLORS`], but that creeping is darker and reused pixels are
+/// lighter on a dark page, where they would not be seen.
 const COLORS: [&str; PixelClass::COUNT] = [
     "#969696",
     "var(--reused)",

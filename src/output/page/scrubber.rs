@@ -24,7 +24,7 @@ impl Report {
             ),
             (
                 "class",
-                "Class of each pixel: blue is reused; red missed, green an edge, purple entering, orange hidden, pink moved, grey traced",
+                "Class of each pixel: blue is reused; red missed, green an edge, purple entering, yellow creeping, orange bad, pink moved, grey traced",
                 first.class.as_ref(),
             ),
             ("depth", "Depth of each frame, near is light", first.depth.as_ref()),
