@@ -72,6 +72,7 @@ pub struct PlanArgs {
 }
 
 #[derive(Debug, Args)]
+#[command(after_help = "What is required, and the stages that follow from it: docs/requirements.md")]
 pub struct InspectArgs {
     /// The scene: .gltf, .glb or .obj.
     pub input: PathBuf,

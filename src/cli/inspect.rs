@@ -3,7 +3,7 @@
 use super::args::{Format, InspectArgs};
 use super::job;
 use super::memory::held_per_pixel;
-use super::say::{self, escaped};
+use super::say::{self, count, escaped};
 use anyhow::Result;
 use buzz::infer::BuzzBuffer;
 use buzz::scene::{
@@ -64,14 +64,14 @@ fn as_text(scene: &Scene, chosen: Option<usize>) -> String {
     let needs = Requirements::of(scene);
     let timing = &scene.timing;
     let mut text = format!(
-        "{} triangles and {} shapes in {} instances, {} materials, {} images, {} lights, {} cameras\n",
-        scene.triangle_count(),
-        scene.shape_count(),
-        scene.instances.len(),
-        scene.materials.len(),
-        scene.images.len(),
-        scene.lights.len(),
-        scene.cameras.len()
+        "{} and {} in {}, {}, {}, {}, {}\n",
+        count(scene.triangle_count(), "triangle"),
+        count(scene.shape_count(), "shape"),
+        count(scene.instances.len(), "instance"),
+        count(scene.materials.len(), "material"),
+        count(scene.images.len(), "image"),
+        count(scene.lights.len(), "light"),
+        count(scene.cameras.len(), "camera")
     );
     text += &format!("frames {}-{} at {:.3} a second\n", timing.first, timing.last, timing.fps.value());
     for (i, camera) in scene.cameras.iter().enumerate() {
@@ -94,6 +94,9 @@ fn as_text(scene: &Scene, chosen: Option<usize>) -> String {
         bytes_per_pixel(scene),
         held_bytes_per_pixel(scene)
     );
+    if scene.ignored.is_empty() {
+        text += "ignored: nothing\n";
+    }
     for ignored in &scene.ignored {
         let Ignored { feature, place, effect } = ignored;
         text += &format!("ignored: {}\n", escaped(format_args!("{feature} at {place}: {effect}")));

@@ -34,7 +34,8 @@ pub fn run() -> ExitCode {
         Ok(cli) => cli,
         Err(error) => {
             if error.use_stderr() {
-                say::complain(one_line(&error.to_string()));
+                let command = std::env::args().nth(1).unwrap_or_default();
+                say::complain(one_line(&error.to_string(), &command));
                 return ExitCode::from(2);
             }
             // Help or the version. A reader that went away is no reason to fail.
@@ -69,8 +70,8 @@ fn dispatch(cli: Cli) -> Result<ExitCode> {
     }
 }
 
-/// What the parser says, without the usage that it adds.
-fn one_line(text: &str) -> String {
+/// What the parser says of arguments that begin with `command`, without the usage that it adds.
+fn one_line(text: &str, command: &str) -> String {
     let lines =
         text.lines().map(str::trim).take_while(|l| !l.starts_with("Usage:") && !l.starts_with("For more"));
     // What is not an option here is hardly ever meant as a value.
@@ -82,6 +83,9 @@ fn one_line(text: &str) -> String {
             "unexpected argument '{stray}': there are INPUT, OUT_DIR and options, and lists take commas without spaces"
         );
     }
+    if let Some(advice) = misplaced(&said, command) {
+        return format!("{command}: {}; {advice}", said.strip_prefix("error: ").unwrap_or(&said));
+    }
     format!("{}; --help lists all options", said.strip_prefix("error: ").unwrap_or(&said))
 }
 
@@ -89,6 +93,23 @@ fn one_line(text: &str) -> String {
 fn stray(said: &str) -> Option<&str> {
     let (word, _) = said.strip_prefix("error: the subcommand '")?.split_once("' cannot be used with")?;
     (!Cli::command().get_subcommands().any(|command| command.get_name() == word)).then_some(word)
+}
+
+/// What to do about an option that is not this command's, but another's.
+fn misplaced(said: &str, command: &str) -> Option<&'static str> {
+    let (option, _) = said.strip_prefix("error: unexpected argument '")?.split_once('\'')?;
+    let is_of_convert = || {
+        let long = option.strip_prefix("--");
+        long.is_some() && Cli::command().get_arguments().any(|argument| argument.get_long() == long)
+    };
+    match (command, option) {
+        ("plan", "-f" | "--frames") => Some("a plan is of all frames: give it to the runs that render them"),
+        ("plan", _) if is_of_convert() => {
+            Some("give it to the runs that render, or after -- with --format openjd")
+        }
+        ("trade", "-q" | "--quality") => Some("trade measures every quality"),
+        _ => None,
+    }
 }
 
 #[cfg(test)]
@@ -99,7 +120,7 @@ mod tests {
     fn what_the_parser_says_fits_on_a_line() {
         let said = |arguments: &[&str]| {
             let error = Cli::try_parse_from([&["buzz-convert"], arguments].concat()).unwrap_err();
-            one_line(&error.to_string())
+            one_line(&error.to_string(), arguments[0])
         };
         assert_eq!(
             said(&["a.gltf"]),
@@ -108,6 +129,9 @@ mod tests {
         assert!(
             said(&["a.gltf", "out", "--frame", "1"]).contains("tip: a similar argument exists: '--frames'")
         );
+        assert!(said(&["plan", "a.gltf", "--aov", "all"]).ends_with("or after -- with --format openjd"));
+        assert!(said(&["plan", "a.gltf", "-f", "1"]).contains("a plan is of all frames"));
+        assert!(said(&["trade", "a.gltf", "out", "-q", "full"]).ends_with("trade measures every quality"));
         assert!(said(&["a.gltf", "out", "-q", "best"]).contains("possible values: full"));
     }
 }

@@ -173,7 +173,7 @@ fn refuse_another_plan(convert: &[String]) -> Result<()> {
 }
 
 fn unparsed(error: clap::Error) -> Error {
-    Error::Usage(one_line(&error.to_string()))
+    Error::Usage(one_line(&error.to_string(), ""))
 }
 
 /// An error if a task could not run its command, or would not run it as it stands here.

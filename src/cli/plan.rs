@@ -92,10 +92,10 @@ fn as_text(plan: &Plan) -> String {
     }
     let traced: f64 = plan.frames.iter().map(|f| f.predicted_traced).sum();
     text += &format!(
-        "{} frames, {} key frames, {} cuts; {:.0} % of camera rays saved, predicted\n",
-        plan.frames.len(),
-        plan.keyframes.len(),
-        plan.cuts.len(),
+        "{}, {}, {}; {:.0} % of camera rays saved, predicted\n",
+        say::count(plan.frames.len(), "frame"),
+        say::count(plan.keyframes.len(), "key frame"),
+        say::count(plan.cuts.len(), "cut"),
         100.0 * (1.0 - traced / plan.frames.len().max(1) as f64)
     );
     text

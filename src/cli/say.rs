@@ -36,3 +36,8 @@ pub fn escaped(text: impl Display) -> String {
 pub fn complain(text: impl Display) {
     line(format_args!("buzz-convert: {text}"));
 }
+
+/// So many of what `one` is called.
+pub fn count(number: usize, one: &str) -> String {
+    format!("{number} {one}{}", if number == 1 { "" } else { "s" })
+}

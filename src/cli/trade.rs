@@ -101,7 +101,7 @@ impl Watch for Shown {
                 // A reader that cannot be reached is no error of the measurement.
                 let _ = say::result(&format!("openjd_progress: {percent}\n"));
             }
-            _ => say::line(format_args!("{done}/{total} segments measured ({})", quality.name())),
+            _ => say::line(format_args!("{done}/{total} measurements ({})", quality.name())),
         }
     }
 

@@ -250,27 +250,32 @@ fn pair_up(mut sequence: Sequences, mut reference: Sequences) -> (Vec<Pair>, Vec
 impl fmt::Display for Comparison {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let titles = ["PSNR dB", "FLIP", "max", "over 5 %"].map(|title| format!("  {title:>8}")).concat();
-        writeln!(f, "{:>15}{titles}  worst at", "frame")?;
-        let row = |f: &mut fmt::Formatter<'_>, name: String, e: ImageError, place: Option<Place>| {
-            let db = e.psnr_db.map_or("same".to_string(), |db| format!("{db:.2}"));
-            let share = 100.0 * e.over_5_percent;
-            let place = place.map(|p| format!("  {},{} (FLIP {:.3} on {3}x{3})", p.x, p.y, p.flip, p.side));
-            let place = place.unwrap_or_default();
-            writeln!(
-                f,
-                "{name:>15}  {db:>8}  {:>8.4}  {:>8.4}  {share:>6.2} %{place}",
-                e.flip_mean, e.max_abs
-            )
-        };
         let mut numbers: Vec<_> = self.frames.iter().map(|frame| frame.frame).collect();
         numbers.sort_unstable();
         let one_sequence = numbers.windows(2).all(|pair| pair[0] != pair[1]);
         let name = |of: &FrameError| if one_sequence { of.frame.to_string() } else { of.file.clone() };
+        let worst = &self.worst;
+        let worst_name = format!("worst ({})", name(worst));
+        let names = self.frames.iter().map(name).chain([worst_name.clone()]);
+        let width = names.map(|name| name.chars().count()).fold(15, usize::max);
+        writeln!(f, "{:>width$}{titles}  worst place", "frame")?;
+        let row = |f: &mut fmt::Formatter<'_>, name: String, e: ImageError, place: Option<Place>| {
+            let db = e.psnr_db.map_or("same".to_string(), |db| format!("{db:.2}"));
+            let share = 100.0 * e.over_5_percent;
+            let place = place.map(|p| {
+                format!("  mean FLIP {:.3} in the {1}x{1} block at {2},{3}", p.flip, p.side, p.x, p.y)
+            });
+            let place = place.unwrap_or_default();
+            writeln!(
+                f,
+                "{name:>width$}  {db:>8}  {:>8.4}  {:>8.4}  {share:>6.2} %{place}",
+                e.flip_mean, e.max_abs
+            )
+        };
         for frame in &self.frames {
             row(f, name(frame), frame.error, frame.worst_place)?;
         }
-        let worst = &self.worst;
-        row(f, format!("worst ({})", name(worst)), worst.error, worst.worst_place)?;
+        row(f, worst_name, worst.error, worst.worst_place)?;
         for (name, mean) in [("mean", self.mean), ("inferred mean", self.inferred_mean)] {
             if mean.frames > 0 {
                 let MeanError { psnr_db, flip_mean, max_abs, over_5_percent, .. } = mean;

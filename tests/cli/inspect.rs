@@ -45,6 +45,7 @@ fn frames_and_cameras_are_those_that_are_asked_for() {
     };
     let said = inspect("--start-frame 1001 --camera Cam").ok().out;
     assert!(said.contains("frames 1001-1004 ") && said.contains("camera 0: Cam (chosen)\n"), "{said}");
+    assert!(said.contains(", 1 light, 1 camera\n") && said.ends_with("ignored: nothing\n"), "{said}");
     let said: Value = serde_json::from_str(&inspect("--camera 0 --format json").ok().out).unwrap();
     assert_eq!((&said["frames"], &said["camera"]), (&serde_json::json!([0, 3]), &0.into()));
     inspect("--camera Nobody").refused(2, &["--camera Nobody: there is no such camera", "0 (Cam)"]);

@@ -158,7 +158,7 @@ fn differences_are_drawn_on_request() {
     let pictures = folder.path().join("pictures");
     let paths = [&out, &full, &pictures].map(|p| p.to_str().unwrap().to_string());
     let text = buzz(["compare", &paths[0], &paths[1], "--differences", &paths[2]]).ok().out;
-    assert!(text.contains("worst at") && text.contains("on 18x18"), "{text}");
+    assert!(text.contains("worst place") && text.contains("in the 18x18 block at "), "{text}");
     assert_eq!(listing(&pictures), ["s.0000.png", "s.0001.png", "s.0002.png", "s.0003.png"]);
     let picture = image::open(pictures.join("s.0002.png")).unwrap().into_rgb8();
     assert_eq!(picture.dimensions(), (3 * 32 + 4 * 4, 18 + 2 * 4));
