@@ -109,7 +109,7 @@ fn a_place_in_a_crop_is_one_of_the_whole_image() {
     assert_eq!((place.x, place.y, place.side), (30, 20, 16));
     let json = serde_json::to_value(&result).unwrap();
     assert_eq!(json["worst"]["worst_place"]["x"], 30);
-    assert!(result.to_string().contains("  30,20 (FLIP"), "{result}");
+    assert!(result.to_string().contains(" in the 16x16 block at 30,20"), "{result}");
 }
 
 #[test]
