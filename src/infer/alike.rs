@@ -3,8 +3,9 @@
 //! Samples have the same words where every bit that one of them has, all have. Which bits these are is found out for many
 //! pixels at once: down their columns, and then along the row. What nothing landed on says nothing.
 
-use super::around::Trust;
-use super::centre::{Basis, CastCentres, ENOUGH_TO_FILL};
+use super::around::{ENOUGH_TO_FILL, Trust};
+use super::basis::Basis;
+use super::rays::CastCentres;
 use super::sources::{MOVED, NAMES, NOTHING, SUSPECT};
 use crate::frame::{FourPoints, SurfaceSample};
 use std::ops::Range;

@@ -2,8 +2,8 @@
 
 use super::buzz_buffer::BuzzBuffer;
 use super::cell::Cell;
-use super::centre::CastCentres;
 use super::projector::Projector;
+use super::rays::CastCentres;
 use super::sources::{MOVED, NOTHING, SUSPECT, Sources};
 use crate::frame::SurfaceSample;
 use glam::Vec3;
@@ -12,11 +12,14 @@ use glam::Vec3;
 const STEP: f32 = 1.0;
 
 /// Least cosine between normals of samples that may lend each other shadow bits.
-pub(super) const SAME_FACING: f32 = 0.9;
+const SAME_FACING: f32 = 0.9;
 
 /// So many samples on its surface, its own among them, must agree before a pixel that was cast borrows shadow bits from the 5x5
 /// around it. What they are wrong about [is followed](super::shadow_edges) from where it is asked.
 const ENOUGH_TO_LEND: usize = 3;
+
+/// So many samples must be known in the 3x3 around a pixel before it is filled from them.
+pub(super) const ENOUGH_TO_FILL: usize = 3;
 
 /// How much is believed without a ray.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -293,4 +296,9 @@ impl<'a> Tangent<'a> {
 /// True where two samples lie on one surface: of one instance, with no step between them that is larger than the side of a pixel there.
 pub fn is_one_surface(a: &SurfaceSample, b: &SurfaceSample, view: &Projector) -> bool {
     Tangent::new(*a, view).reaches(b)
+}
+
+/// True where two samples look nearly the same way.
+pub(super) fn is_facing_alike(a: &SurfaceSample, b: &SurfaceSample) -> bool {
+    a.surface.is_background() || a.normal.get().dot(b.normal.get()) > SAME_FACING
 }

@@ -16,8 +16,8 @@
 
 use super::around::Tangent;
 use super::buzz_buffer::{Row, UNKNOWN};
-use super::centre::CastCentres;
 use super::projector::Projector;
+use super::rays::CastCentres;
 use crate::frame::SurfaceSample;
 
 /// One pixel of a row in so many is cast and asks for itself.

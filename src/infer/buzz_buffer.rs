@@ -1,10 +1,9 @@
 //! The Buzzbuffer: a window-sized store of samples, the paper's data structure and its namesake.
 
-use super::moved::Motion;
 use super::projector::Projector;
+use super::rays::CastRays;
 use super::subpixel::SubPixels;
 use crate::frame::{PackedNormal, PixelClass, RayCounts, SurfaceRef, SurfaceSample};
-use crate::scene::View;
 use glam::Vec3;
 use rayon::prelude::*;
 
@@ -290,33 +289,5 @@ impl<'a> Row<'a> {
         self.object[x] = sample.object;
         self.surface[x] = sample.surface;
         self.normal[x] = sample.normal;
-    }
-}
-
-/// Whatever can find out what a pixel's centre sees: the tracer, or a test's table.
-pub trait CastRays: Sync {
-    /// The sample that the ray through the centre of pixel (x, y) finds; sets `lit`, counts what it casts.
-    fn cast(&self, x: usize, y: usize, lit: &mut [u32], counts: &mut RayCounts) -> SurfaceSample;
-
-    /// Visits, in any order, the corners (metres, relative to the segment's origin) of triangles that open to the eye between `old` and the
-    /// view that rays are cast for: whose visible side the old view saw as a line, or not at all.
-    fn turned(&self, old: &View, visit: &(dyn Fn([Vec3; 3]) + Sync)) {
-        let _ = (old, visit);
-    }
-
-    /// Visits, in any order, outlines (corners in order around, metres, relative to the segment's origin) of what the near or far plane of
-    /// `old` cut off, and the view that rays are cast for sees.
-    fn uncut(&self, old: &View, visit: &(dyn Fn(&[Vec3]) + Sync)) {
-        let _ = (old, visit);
-    }
-
-    /// True if the result is not wanted any more: no further row is begun. Once true, it stays true.
-    fn is_cancelled(&self) -> bool {
-        false
-    }
-
-    /// What differs beside the camera from the frame that is inferred from; by default nothing.
-    fn motion(&self) -> Option<&dyn Motion> {
-        None
     }
 }

@@ -1,15 +1,15 @@
 //! Sub-pixels from what landed on them and around them: super-sampling's [`Source`] in inferred frames.
 
-use super::Marks;
-use super::around::{Trust, is_one_surface};
+use super::around::{ENOUGH_TO_FILL, Trust, is_facing_alike, is_one_surface};
 use super::buzz_buffer::BuzzBuffer;
-use super::centre::{CastCentres, ENOUGH_TO_FILL};
 use super::lattice::{Lattice, Position};
+use super::marks::Marks;
 use super::moved::is_passed;
 use super::project::{AT_CENTRE, Landings};
 use super::projector::Projector;
-use super::subpixel::Samples;
-use super::supersample::{Slot, Source, is_facing_alike};
+use super::rays::CastCentres;
+use super::samples::Samples;
+use super::slot::{Slot, Source};
 use crate::frame::{PixelClass, SurfaceSample};
 
 /// So many samples on its surface must agree before a sub-pixel that was cast borrows shadow bits from the 5x5 around it: more than

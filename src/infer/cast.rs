@@ -2,14 +2,15 @@
 //! lights that may have changed.
 
 use super::around::{Around, Lent, Tangent, Trust, is_one_surface};
+use super::basis::Basis;
 use super::between::{self, Changed, Steps};
 use super::buzz_buffer::{BuzzBuffer, Row, UNKNOWN, pixels_around};
 use super::cell::growth;
-use super::centre::{Basis, CastCentres};
 use super::entering::KnownArea;
 use super::moved::Askers;
 use super::projector::Projector;
 use super::questions::{LightQuestions, Questions};
+use super::rays::CastCentres;
 use super::shares::{carry, spare};
 use super::tiles::Tiles;
 use crate::frame::{PixelClass, RayCounts, SurfaceSample};

@@ -6,8 +6,8 @@
 //! shadow, is known to lie between two old pixels; so where all four say the same, neither passes here.
 
 use super::buzz_buffer::BuzzBuffer;
-use super::centre::CastCentres;
 use super::projector::Projector;
+use super::rays::CastCentres;
 use glam::Vec2;
 
 /// Four old pixels, in rows, and where between their centres a point lies.

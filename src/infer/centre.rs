@@ -19,126 +19,27 @@
 //! of lights that have a size are carried along with the surface ([`carry`]); where they change fast from point to point,
 //! a few rays renew them.
 
-use super::Marks;
 use super::alike::{Alike, AlikeRow};
-use super::around::{Around, Trust, believes_cells};
-use super::buzz_buffer::{BuzzBuffer, CastRays, Row, UNKNOWN};
+use super::around::{Around, ENOUGH_TO_FILL, Trust, believes_cells};
+use super::basis::Basis;
+use super::buzz_buffer::{BuzzBuffer, Row, UNKNOWN};
 use super::cast::Pass;
 use super::entering::KnownArea;
 use super::frontier::Frontier;
+use super::marks::Marks;
 use super::moved::Askers;
 use super::outlines::Outlines;
 use super::project::Landings;
 use super::projector::Projector;
 use super::questions::{LightQuestions, Questions};
+use super::rays::CastCentres;
 use super::shadow_edges::ShadowEdges;
 use super::shafts::Shafts;
 use super::shares::{carry, spare};
 use super::sources::Sources;
 use super::tiles::Tiles;
-use crate::frame::{FourPoints, PixelClass, RayCounts, SurfaceRef, SurfaceSample};
+use crate::frame::{PixelClass, RayCounts, SurfaceSample};
 use rayon::prelude::*;
-use std::ops::Range;
-
-/// What re-centring asks of the scene, beside whole rays: parts of one, and surfaces that are known already.
-pub trait CastCentres: CastRays {
-    /// What is worth remembering from one pixel to the next; it changes no answer.
-    type Memory: Default;
-
-    /// The sample that the ray through the centre of pixel (x, y) finds; no light is asked for.
-    fn hit(&self, x: usize, y: usize, counts: &mut RayCounts) -> SurfaceSample;
-
-    /// Finds out which of the lights named by the bits of `ask` reach the sample, and changes their bits in `lit`. Where `ask`
-    /// has bits of [`CastCentres::confirm`] only, the shares in `lit` are believed unless a few rays speak against them.
-    fn recast(&self, sample: &SurfaceSample, ask: &[u32], lit: &mut [u32], counts: &mut RayCounts);
-
-    /// Sets in `differ` bits of the lights on which two samples disagree: all bits in which they differ, unless some of
-    /// them belong to numbers that are noisy.
-    fn differ(&self, a: &[u32], b: &[u32], differ: &mut [u32]) {
-        for ((differ, a), b) in differ.iter_mut().zip(a).zip(b) {
-            *differ |= a ^ b;
-        }
-    }
-
-    /// True if two samples' shadow bits mean the same: [`CastCentres::differ`] would set none.
-    fn agree(&self, a: &[u32], b: &[u32]) -> bool {
-        a == b
-    }
-
-    /// True if an edge of a shadow may lie between two samples.
-    fn has_edge(&self, a: &[u32], b: &[u32]) -> bool {
-        a != b
-    }
-
-    /// Whether any of a sample's bits are numbers: shares of light.
-    fn has_shares(&self) -> bool {
-        false
-    }
-
-    /// Sets in `ask` what asks all lights for their bits, and shares only to be confirmed.
-    fn confirm(&self, ask: &mut [u32]) {
-        ask.fill(u32::MAX);
-    }
-
-    /// Makes of all that `ask` asks of shares to confirm them.
-    fn soften(&self, ask: &mut [u32]) {
-        let _ = ask;
-    }
-
-    /// Clears in `ask` what asks for shares only to be confirmed: there is no edge of a shadow.
-    fn keep_edges(&self, ask: &mut [u32]) {
-        let _ = ask;
-    }
-
-    /// Sets in `ask` all bits of the shares about which it asks anything: once answered, nothing is left to be asked.
-    fn settle(&self, ask: &mut [u32]) {
-        let _ = ask;
-    }
-
-    /// Sets the shares in `lit` to the mean of those that are `known`, each with its weight.
-    fn blend<'a>(&self, known: impl Iterator<Item = (&'a [u32], f32)> + Clone, lit: &mut [u32]) {
-        let _ = (known, lit);
-    }
-
-    /// What the ray through the centre of pixel (x, y) meets first of the triangles that `candidates` lie on. Where these
-    /// are the background: that. Not counted, as nothing is looked for in the scene.
-    fn nearest_of(
-        &self,
-        x: usize,
-        y: usize,
-        candidates: impl Iterator<Item = SurfaceSample>,
-        memory: &mut Self::Memory,
-    ) -> Option<SurfaceSample>;
-
-    /// Where the rays through the centres of four pixels of a row, from (x, y) on, meet the triangle that `surface` lies on; to
-    /// the last bit what [`CastCentres::nearest_of`] finds. None if they have to be looked at one by one.
-    fn four_on(
-        &self,
-        (x, y): (usize, usize),
-        surface: SurfaceRef,
-        memory: &mut Self::Memory,
-    ) -> Option<FourPoints> {
-        let _ = (x, y, surface, memory);
-        None
-    }
-
-    /// True if something hides the sample from the eye. Counted as `visibility`.
-    fn is_hidden(&self, sample: &SurfaceSample, counts: &mut RayCounts) -> bool;
-
-    /// True if it is known, without a ray for each, that none of the samples `at` the centres of a rectangle of pixels, columns
-    /// and rows, is hidden from the eye.
-    fn sees_all(
-        &self,
-        pixels: (Range<usize>, Range<usize>),
-        at: impl Fn(usize, usize) -> SurfaceSample,
-    ) -> bool {
-        let _ = (pixels, at);
-        false
-    }
-}
-
-/// So many samples must be known in the 3x3 around a pixel before it is filled from them.
-pub(super) const ENOUGH_TO_FILL: usize = 3;
 
 /// What re-centring holds between frames, so that nothing is allocated for each.
 #[derive(Debug, Default)]
@@ -240,24 +141,6 @@ impl Centring {
         counts
     }
 }
-
-/// What inferring a frame from another goes by.
-pub(super) struct Basis<'a, R> {
-    pub old: &'a BuzzBuffer,
-    /// What of it has landed where.
-    pub sources: &'a Sources,
-    pub view: &'a Projector,
-    pub rays: &'a R,
-    pub trust: Trust,
-}
-
-impl<R> Clone for Basis<'_, R> {
-    fn clone(&self) -> Self {
-        *self
-    }
-}
-
-impl<R> Copy for Basis<'_, R> {}
 
 impl<R: CastCentres> Basis<'_, R> {
     /// Stores what is at the centre of a pixel around which all is alike, if anything is.

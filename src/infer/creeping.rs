@@ -8,8 +8,8 @@
 //! is seen between the legs of a table. Its cause is that "consecutive edge pixels do not reproject consecutively", so
 //! only ends that came from neighbouring pixels count here.
 
-use super::Marks;
 use super::buzz_buffer::{BuzzBuffer, UNKNOWN};
+use super::marks::Marks;
 use super::obscured::DEPTH_STEP;
 use super::project::Landings;
 use crate::frame::PixelClass;

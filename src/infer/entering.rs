@@ -8,9 +8,9 @@
 //! Past the paper, for samples at pixel centres, less is enough: [`at_sides`]. What a near or far plane no longer cuts off comes in
 //! anywhere: see [`uncovered`](super::uncovered()).
 
-use super::Marks;
 use super::buzz_buffer::BuzzBuffer;
 use super::cell::place_before;
+use super::marks::Marks;
 use super::project::{AT_CENTRE, Landings};
 use super::projector::Projector;
 use crate::frame::PixelClass;

@@ -10,7 +10,7 @@
 //! | Buzzbuffer | [`BuzzBuffer`] |
 //! | id_tag, -2 | [`BuzzBuffer::object`], [`UNKNOWN`] |
 //! | the four by four matrix, d / (d + z_t) | [`Projector`] |
-//! | good, missed, overlapped, bad pixels | [`PixelClass`] |
+//! | good, missed, overlapped, bad pixels | [`PixelClass`](crate::frame::PixelClass) |
 //! | miny, (begx, begy) | depth and pixel of a landing, in [`project()`] |
 //! | L, C, C1, (endx, endy), int_z | `ImageLine` in `obscured.rs` |
 //! | test_z | in [`creeping()`] |
@@ -23,6 +23,7 @@
 
 mod alike;
 mod around;
+mod basis;
 mod between;
 mod bodies;
 mod buzz_buffer;
@@ -34,16 +35,20 @@ mod creeping;
 mod entering;
 mod frontier;
 mod lattice;
+mod marks;
 mod moved;
 mod obscured;
 mod outlines;
 mod project;
 mod projector;
 mod questions;
+mod rays;
+mod samples;
 mod seen;
 mod shadow_edges;
 mod shafts;
 mod shares;
+mod slot;
 mod sources;
 mod stereo;
 mod subpixel;
@@ -54,31 +59,32 @@ mod voxels;
 
 pub use around::{Trust, is_one_surface};
 pub use bodies::{Bodies, Body};
-pub use buzz_buffer::{BuzzBuffer, CastRays, UNKNOWN};
-pub use centre::{CastCentres, Centring};
+pub use buzz_buffer::{BuzzBuffer, UNKNOWN};
+pub use centre::Centring;
 pub use creeping::{Along, creeping};
 pub use entering::entering;
 pub use lattice::{Cells, Lattice, Position};
-pub use moved::Motion;
+pub use marks::Marks;
 pub use obscured::obscured;
 pub use project::{Landings, gather, project};
 pub use projector::{Projected, Projector};
+pub use rays::{CastCentres, CastRays, Motion};
+pub use samples::Samples;
 pub use seen::SeenLight;
 pub use stereo::{Parallax, in_gaps, other_eye};
-pub use subpixel::{Level, Samples, SubPixels};
+pub use subpixel::{Level, SubPixels};
 pub use supersample::Supersampling;
 pub use uncovered::uncovered;
 pub use voxels::{Line, Voxels};
 
-use crate::frame::{PixelClass, RayCounts};
+use crate::frame::RayCounts;
 use crate::scene::View;
 use creeping::forget_creeping;
 use entering::{KnownArea, at_sides};
 use glam::DVec3;
 use moved::{moved, relight, ride};
-use rayon::prelude::*;
 use shafts::Shafts;
-use std::sync::atomic::{AtomicU8, AtomicU64, Ordering::Relaxed};
+use std::sync::atomic::AtomicU64;
 use std::time::{Duration, Instant};
 
 /// Infers frames from their neighbours. Holds what the work needs between two frames, so that none is allocated for
@@ -121,7 +127,7 @@ impl Inference {
     pub fn bytes_per_pixel(levels: u32, words: usize, moves: bool) -> usize {
         let buffer = BuzzBuffer::bytes_per_pixel(words) + SubPixels::bytes_per_pixel(levels, words);
         let now = if moves { buffer + Shafts::bytes_per_pixel(words) } else { 0 };
-        let marks = size_of::<AtomicU64>() + size_of::<AtomicU8>();
+        let marks = size_of::<AtomicU64>() + Marks::BYTES_PER_PIXEL;
         marks + Centring::bytes_per_pixel(words) + Supersampling::bytes_per_pixel(levels, words) + now
     }
 
@@ -248,39 +254,4 @@ impl Cost {
         self.rays += cast();
         self.tracing += start.elapsed();
     }
-}
-
-/// What has been found out about each pixel. The strongest finding stays, whatever the order of finding.
-#[derive(Debug, Default)]
-pub struct Marks(Vec<AtomicU8>);
-
-impl Marks {
-    /// Nothing is known about any of `pixels` pixels.
-    pub fn clear(&mut self, pixels: usize) {
-        self.0.resize_with(pixels, AtomicU8::default);
-        self.0.par_iter_mut().with_min_len(1 << 14).for_each(|m| *m.get_mut() = 0);
-    }
-
-    /// Notes that a pixel is of `class`, one of those below; a later one in this order wins.
-    pub fn set(&self, pixel: usize, class: PixelClass) {
-        let rank = Self::RANKS.iter().position(|&c| c == class).unwrap_or(0) as u8 + 1;
-        // Reading is much cheaper, and nearly all that is found is known.
-        if self.0[pixel].load(Relaxed) < rank {
-            self.0[pixel].fetch_max(rank, Relaxed);
-        }
-    }
-
-    /// The strongest finding about a pixel.
-    pub fn get(&self, pixel: usize) -> Option<PixelClass> {
-        let rank = self.0[pixel].load(Relaxed).checked_sub(1)?;
-        Some(Self::RANKS[rank as usize])
-    }
-
-    const RANKS: [PixelClass; 5] = [
-        PixelClass::Overlapped,
-        PixelClass::Bad,
-        PixelClass::Moved,
-        PixelClass::Entering,
-        PixelClass::Creeping,
-    ];
 }

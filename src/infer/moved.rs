@@ -7,42 +7,22 @@
 //! lets that light's ray be cast anew if it passes through an entered voxel where the light had arrived, or through one
 //! that was left where it had not.
 //!
-//! Few lines have anything that moved near them: [`Bodies`] and [`Shafts`] tell which. And where neighbours agree on a light
+//! Few lines have anything that moved near them: [`Bodies`](super::bodies::Bodies) and [`Shafts`] tell which. And where neighbours agree on a light
 //! that may have changed it need not be asked at all: see [`Changed`](super::between::Changed).
 //!
 //! Departure: the paper stores t for each light, up to which its shadow ray is known to be free, to walk no further. We
 //! store a bit; so a shadow that something else casts too is asked for more often than need be.
 
-use super::Marks;
-use super::bodies::{Bodies, Shaft};
+use super::bodies::Shaft;
 use super::buzz_buffer::{BuzzBuffer, Row, UNKNOWN};
+use super::marks::Marks;
 use super::project::Landings;
 use super::projector::Projector;
+use super::rays::Motion;
 use super::shafts::{Shafts, Span, TILE, pixels};
 use super::voxels::Line;
 use crate::frame::{LightChange, LightWay, PixelClass, RayCounts, SurfaceSample, Way};
 use rayon::prelude::*;
-
-/// What differs between two frames beside the camera, and what inference asks about it.
-pub trait Motion: Sync {
-    /// All that moved.
-    fn bodies(&self) -> &Bodies;
-
-    /// The number of the body that carries a sample; none if its surface stands still.
-    fn body_of(&self, sample: &SurfaceSample) -> Option<usize>;
-
-    /// A sample of a body in the frame that is inferred; none if it has vanished.
-    fn follow(&self, sample: &SurfaceSample) -> Option<SurfaceSample>;
-
-    /// The ways on which light comes to samples: one for each light, and one for the world if that gives ambient light.
-    fn ways(&self) -> &[LightWay];
-
-    /// True if light number `light`, of those whose [`LightChange`] is `Reach`, shines where a sample is, and did not before.
-    fn arrives_anew(&self, light: usize, sample: &SurfaceSample) -> bool;
-
-    /// See [`super::CastCentres::recast`].
-    fn recast(&self, sample: &SurfaceSample, ask: &[u32], lit: &mut [u32], counts: &mut RayCounts);
-}
 
 /// Makes `now` of `old`, with samples of bodies where they are now.
 pub(super) fn ride(old: &BuzzBuffer, motion: &dyn Motion, now: &mut BuzzBuffer) {

@@ -9,8 +9,8 @@
 //! centres, which kills wrongly at the line's start. And only samples at a discontinuity start a line: within a
 //! surface, the lines of its rim bound the hidden volume already.
 
-use super::Marks;
 use super::buzz_buffer::{BuzzBuffer, UNKNOWN, pixels_around};
+use super::marks::Marks;
 use super::project::Landings;
 use super::projector::Projector;
 use crate::frame::PixelClass;

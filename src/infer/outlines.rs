@@ -14,9 +14,9 @@
 use super::around::{Tangent, is_one_surface};
 use super::buzz_buffer::{BuzzBuffer, pixels_around};
 use super::cast::Pass;
-use super::centre::CastCentres;
 use super::frontier::Frontier;
 use super::questions::LightQuestions;
+use super::rays::CastCentres;
 use crate::frame::{PixelClass, RayCounts};
 use std::ops::Range;
 

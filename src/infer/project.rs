@@ -1,7 +1,7 @@
 //! Projection of the old samples into the new view: the nearest hit on a pixel wins.
 
-use super::Marks;
 use super::buzz_buffer::{BuzzBuffer, UNKNOWN};
+use super::marks::Marks;
 use super::projector::{Projected, Projector};
 use crate::frame::PixelClass;
 use rayon::prelude::*;

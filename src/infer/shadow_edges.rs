@@ -8,10 +8,10 @@
 
 use super::around::is_one_surface;
 use super::buzz_buffer::{BuzzBuffer, pixels_around};
-use super::centre::CastCentres;
 use super::frontier::Frontier;
 use super::projector::Projector;
 use super::questions::LightQuestions;
+use super::rays::CastCentres;
 use crate::frame::RayCounts;
 use rayon::prelude::*;
 use std::ops::Range;

@@ -8,8 +8,8 @@
 use super::around::{Tangent, Trust};
 use super::buzz_buffer::BuzzBuffer;
 use super::cell::place_before;
-use super::centre::CastCentres;
 use super::projector::Projector;
+use super::rays::CastCentres;
 use crate::frame::SurfaceSample;
 
 /// Interpolates into `lit` the shares of `sample`, at the centre of `pixel` (x, y), near which the sample of old pixel `i`

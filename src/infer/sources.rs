@@ -1,7 +1,7 @@
 //! Where the samples of a new image come from.
 
-use super::Marks;
 use super::buzz_buffer::BuzzBuffer;
+use super::marks::Marks;
 use super::project::Landings;
 use crate::frame::PixelClass;
 use rayon::prelude::*;

@@ -7,8 +7,8 @@
 //! Departures: gaps are cleared after all samples have landed, so that the order of pixels does not matter; and what stands
 //! in a gap stays if it is nearer than anything that was hidden could be there.
 
-use super::Marks;
 use super::buzz_buffer::BuzzBuffer;
+use super::marks::Marks;
 use super::obscured::DEPTH_STEP;
 use super::project::Landings;
 use super::projector::{Projected, Projector};

@@ -15,16 +15,18 @@
 //! What inference has found out about the pixel goes for its sub-pixels: where something unknown may stand before it, or a
 //! gap opened in an object, they are traced. So only positions on which something landed are cleaned up.
 
-use super::around::{SAME_FACING, Trust, is_one_surface};
+use super::around::{Trust, is_facing_alike, is_one_surface};
 use super::buzz_buffer::{BuzzBuffer, UNKNOWN};
 use super::carried::Carried;
-use super::centre::CastCentres;
-use super::lattice::{Lattice, Position};
+use super::lattice::Lattice;
 use super::moved::Askers;
 use super::project::Landings;
 use super::projector::Projector;
+use super::rays::CastCentres;
+use super::samples::Samples;
 use super::shafts::Shafts;
-use super::subpixel::{Level, Samples, SubPixels};
+use super::slot::{Nothing, Slot, Source};
+use super::subpixel::{Level, SubPixels};
 use super::{Cost, Inference, rides};
 use crate::frame::{RayCounts, SubPixelCounts, SurfaceSample};
 use crate::scene::View;
@@ -106,44 +108,6 @@ fn land(old: Samples<'_>, view: &Projector, landings: &mut Landings) -> u64 {
         u64::from(number >= pixels)
     };
     (0..old.count()).into_par_iter().with_min_len(1 << 12).map(land_one).sum()
-}
-
-/// A sub-pixel that is being made.
-pub(super) struct Slot<'a> {
-    pub at: Position,
-    pub sample: &'a mut SurfaceSample,
-    pub lit: &'a mut [u32],
-    /// Bits of the lights that have to be asked.
-    pub ask: &'a mut [u32],
-}
-
-/// Where samples may come from instead of from rays.
-pub(super) trait Source: Sync {
-    /// True if a sample of a sub-pixel landed there.
-    fn is_landed(&self, at: Position) -> bool;
-
-    /// Finds the sample without a ray, if it can, and which lights must be asked, in a frame of which the `pixels` are there.
-    fn settle(&self, slot: &mut Slot<'_>, pixels: &BuzzBuffer) -> bool;
-
-    /// Lends the sample, which was cast, shadow bits; what it cannot lend must be asked.
-    fn lend(&self, slot: &mut Slot<'_>);
-}
-
-/// A key frame has no other to take samples from.
-struct Nothing;
-
-impl Source for Nothing {
-    fn is_landed(&self, _: Position) -> bool {
-        false
-    }
-
-    fn settle(&self, _: &mut Slot<'_>, _: &BuzzBuffer) -> bool {
-        false
-    }
-
-    fn lend(&self, slot: &mut Slot<'_>) {
-        slot.ask.fill(u32::MAX);
-    }
 }
 
 /// Chooses the sub-pixels of `new`, finds their samples in `source`, and casts the others; with `proves`, those that were
@@ -242,8 +206,4 @@ fn differ<'a>(
             || !is_facing_alike(&first, &sample)
             || !rays.agree(first_lit, lit)
     })
-}
-
-pub(super) fn is_facing_alike(a: &SurfaceSample, b: &SurfaceSample) -> bool {
-    a.surface.is_background() || a.normal.get().dot(b.normal.get()) > SAME_FACING
 }

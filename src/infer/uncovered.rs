@@ -5,7 +5,7 @@
 //! appears where the eye crosses its plane, a house where it comes within the far plane. The paper does not have these cases; its
 //! objects are solid, and no plane cuts them. So whatever lies behind such a surface on the new image is not to be believed.
 
-use super::Marks;
+use super::marks::Marks;
 use super::project::Landings;
 use super::projector::Projector;
 use crate::frame::PixelClass;
