@@ -7,7 +7,8 @@
 //! its own tree, and so do meshes that are placed so often that copies of them would not fit in memory.
 //! Only what rays meet is rounded: points on surfaces come from the meshes themselves.
 
-use super::tree::{Bounds, Part, Tree};
+use super::bounds::Bounds;
+use super::tree::{Part, Tree};
 use super::{Group, place_group, world_from_object};
 use crate::scene::{Pose, Scene};
 use glam::{DAffine3, DVec3};

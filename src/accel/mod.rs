@@ -9,6 +9,7 @@
 //! Static scenes build their lower trees once; [`Accel::place`] then costs one small tree over the instances, and nothing
 //! at all when neither the origin nor an instance has moved.
 
+mod bounds;
 mod convex;
 mod deform;
 mod displaced;
@@ -18,6 +19,7 @@ mod intersect;
 mod known;
 mod opacity;
 mod placed_shape;
+mod ray;
 mod shape;
 mod tree;
 mod triangle;
@@ -27,20 +29,21 @@ mod wide;
 
 use crate::frame::SurfaceRef;
 use crate::scene::{Mesh, Pose, Scene};
+use bounds::Bounds;
 use deform::{Deformed, affine, is_deformable};
 pub use displaced::{Displaced, Posed};
 pub use frustum::Frustum;
 use fused::Fused;
 use glam::{Affine3A, DAffine3, DMat3, DVec3, Mat3A, Vec3, Vec3A, Vec4};
-pub use intersect::{PreparedRay, Ray, RayHit, Sides};
 pub use known::KnownTriangles;
 use placed_shape::PlacedShape;
+pub use ray::{PreparedRay, Ray, RayHit, Sides};
 use rayon::prelude::*;
 use std::collections::{HashMap, HashSet};
 use std::ops::Range;
 use std::sync::Arc;
 pub(crate) use tree::scrambled;
-use tree::{Bounds, Built, Part, Tree, build};
+use tree::{Built, Part, Tree, build};
 use wide::WideTree;
 
 /// The scene as rays meet it. See the [module](self).

@@ -1,9 +1,9 @@
 //! An analytic shape where it stands in render space.
 
 use super::Placement;
-use super::intersect::{LocalRay, RayHit, Sides};
+use super::bounds::Bounds;
 use super::opacity::{self, CULL_BACK, EYE_PASS, EYE_TEST, SHADOW_PASS, SHADOW_TEST};
-use super::tree::Bounds;
+use super::ray::{LocalRay, RayHit, Sides};
 use crate::frame::SurfaceRef;
 use crate::scene::{Mesh, Scene};
 use glam::{DAffine3, DVec3, Mat3, Vec3};

@@ -1,10 +1,11 @@
 //! The tree of one placed thing: all meshes that share a transform, in their own space.
 
+use super::bounds::Bounds;
 use super::opacity;
 use super::triangle::{TreeTriangle, TrianglePack};
 use super::wide::WideTree;
 use crate::scene::Scene;
-use glam::{Affine3A, Vec3};
+use glam::Vec3;
 use obvhs::aabb::Aabb;
 use obvhs::bvh2::reinsertion::ReinsertionOptimizer;
 use obvhs::ploc::{PlocBuilder, PlocSearchDistance, SortPrecision};
@@ -17,9 +18,6 @@ const MAX_COORDINATE: f32 = 1e15;
 /// never loses a ray that runs along a box's side. The test's error grows with the distance of the ray's origin; see
 /// [`Bounds::approach`].
 const PADDING: f32 = 1.0 / (1 << 18) as f32;
-
-/// A ray that starts further away than this many sizes of a tree's bounds is brought nearer.
-const FAR: f32 = 4.0;
 
 /// A tree over triangles.
 #[derive(Default)]
@@ -44,90 +42,6 @@ impl<'a> Part<'a> {
     /// A mesh in its own space.
     pub fn of(mesh: usize, positions: &'a [Vec3]) -> Self {
         Self { mesh, positions, mirrored: false }
-    }
-}
-
-/// An axis-aligned box.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Bounds {
-    pub min: Vec3,
-    pub max: Vec3,
-}
-
-impl Default for Bounds {
-    fn default() -> Self {
-        Self { min: Vec3::INFINITY, max: Vec3::NEG_INFINITY }
-    }
-}
-
-impl Bounds {
-    /// The box around those of the points that are finite.
-    pub fn of(points: &[Vec3]) -> Self {
-        let mut bounds = Self::default();
-        points.iter().filter(|p| p.is_finite()).for_each(|&p| bounds.include(p));
-        bounds
-    }
-
-    pub fn include(&mut self, point: Vec3) {
-        self.min = self.min.min(point);
-        self.max = self.max.max(point);
-    }
-
-    pub fn join(&mut self, other: Self) {
-        self.min = self.min.min(other.min);
-        self.max = self.max.max(other.max);
-    }
-
-    pub fn is_empty(&self) -> bool {
-        !self.min.cmple(self.max).all()
-    }
-
-    pub fn corners(&self) -> [Vec3; 8] {
-        std::array::from_fn(|i| {
-            let pick = |bit: usize, min: f32, max: f32| if i & bit == 0 { min } else { max };
-            let (min, max) = (self.min, self.max);
-            Vec3::new(pick(1, min.x, max.x), pick(2, min.y, max.y), pick(4, min.z, max.z))
-        })
-    }
-
-    /// The box around this one where `m` puts it.
-    pub fn transformed(&self, m: &Affine3A) -> Self {
-        let mut bounds = Self::default();
-        self.corners().into_iter().for_each(|corner| bounds.include(m.transform_point3(corner)));
-        bounds
-    }
-
-    /// The largest absolute coordinate.
-    pub fn reach(&self) -> f32 {
-        self.min.abs().max(self.max.abs()).max_element()
-    }
-
-    /// How far along it a ray should start so that the tests against what is in here, whose errors grow with the
-    /// distance of the origin, stay within the boxes' padding: 0 if it is near, otherwise the parameter of a point
-    /// about one size before the bounds. Rounding that point moves the ray as a whole, the same for all tests, and no
-    /// more than rounding has moved it already.
-    pub fn approach(&self, origin: Vec3, direction: Vec3) -> f32 {
-        let size = (self.max - self.min).max_element();
-        let away = (self.min - origin).max(origin - self.max).max_element();
-        if away <= size * FAR {
-            return 0.0;
-        }
-        // As far as the origin is away, less one size, is surely before the bounds, whatever the direction.
-        let start = (away - size) / direction.length();
-        if start.is_finite() { start } else { 0.0 }
-    }
-
-    /// Larger on all sides by the padding of a tree that reaches so far, or up to twice that.
-    ///
-    /// By how much hangs on the box's number: among neighbours that are all equally near, as in a straight pipe or a row of lamps, the
-    /// builder takes the last, and so would join one pair only in each of its passes.
-    fn padded(self, reach: f32, number: u32) -> Self {
-        let bits = scrambled(number);
-        let padding = |first: u32| {
-            let more = Vec3::from([0, 5, 10].map(|shift| (bits >> (first + shift) & 31) as f32 / 32.0));
-            (Vec3::ONE + more) * (reach * PADDING)
-        };
-        Self { min: self.min - padding(0), max: self.max + padding(15) }
     }
 }
 
@@ -187,7 +101,7 @@ pub(super) fn build(bounds: &[Bounds], reach: f32, most: usize) -> Built {
         return Built::default();
     }
     // A horizon far away should not fatten what is near the middle.
-    let padded = bounds.iter().zip(0..).map(|(b, number)| b.padded(b.reach().max(reach / 64.0), number));
+    let padded = bounds.iter().zip(0..).map(|(b, number)| padded(b, b.reach().max(reach / 64.0), number));
     let boxes: Vec<Aabb> = padded.map(|b| Aabb::new(b.min.into(), b.max.into())).collect();
     let indices = (0..boxes.len() as u32).collect();
     let mut builder = PlocBuilder::with_capacity(boxes.len());
@@ -195,6 +109,19 @@ pub(super) fn build(bounds: &[Bounds], reach: f32, most: usize) -> Built {
     ReinsertionOptimizer::default().run(&mut bvh2, 0.05, None);
     let (tree, order, leaves) = WideTree::new(&bvh2, most);
     Built { tree, order, leaves }
+}
+
+/// A box larger on all sides by the padding of a tree that reaches so far, or up to twice that.
+///
+/// By how much hangs on the box's number: among neighbours that are all equally near, as in a straight pipe or a row of lamps, the
+/// builder takes the last, and so would join one pair only in each of its passes.
+fn padded(bounds: &Bounds, reach: f32, number: u32) -> Bounds {
+    let bits = scrambled(number);
+    let padding = |first: u32| {
+        let more = Vec3::from([0, 5, 10].map(|shift| (bits >> (first + shift) & 31) as f32 / 32.0));
+        (Vec3::ONE + more) * (reach * PADDING)
+    };
+    Bounds { min: bounds.min - padding(0), max: bounds.max + padding(15) }
 }
 
 /// Bits that have nothing to do with those of the next number (Wellons' `lowbias32`).

@@ -7,7 +7,7 @@
 
 mod leaves;
 
-use super::tree::Bounds;
+use super::bounds::Bounds;
 use glam::{Vec3, Vec4};
 use leaves::Leaves;
 use obvhs::bvh2::Bvh2;

@@ -1,6 +1,6 @@
 //! Which parts of a binary tree become the children of a wide node, and which its leaves.
 
-use crate::accel::tree::Bounds;
+use crate::accel::bounds::Bounds;
 use obvhs::bvh2::Bvh2;
 use std::ops::Range;
 
