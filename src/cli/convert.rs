@@ -70,7 +70,7 @@ pub fn run(args: ConvertArgs) -> Result<ExitCode> {
     let to_render = &request.frames - &kept_numbers;
     if !to_render.is_empty() {
         memory::refuse_over(memory_limit, &job, 0)?;
-        let is_there = |&&f: &&i64| pictures_of(f, &job.settings).any(|id| folder.file_of(id).exists());
+        let is_there = |&&f: &&i64| job.settings.pictures_of(f).any(|id| folder.file_of(id).exists());
         let replaced = to_render.iter().filter(is_there).copied().collect();
         let whole = out_dir.join(WHOLE_REPORT);
         remove_stale_reports(&request.report, &whole, input, &hash, &replaced, &args)?;
@@ -87,7 +87,7 @@ pub fn run(args: ConvertArgs) -> Result<ExitCode> {
         settings_hash: hash.clone(),
     };
     let mut sink = ExrSink::new(folder, options)?;
-    let frames = to_render.iter().flat_map(|&f| pictures_of(f, &job.settings)).count();
+    let frames = to_render.iter().flat_map(|&f| job.settings.pictures_of(f)).count();
     let on_the_way = plan.on_the_way(&to_render);
     let work = Work { frames, on_the_way };
     // Its clock tells how long frames take: it begins with them.
@@ -170,7 +170,7 @@ impl<'a> Request<'a> {
 /// is replaced, and that its own report can be written.
 fn claim_folder(request: &Request, names: NamePattern, job: &Job) -> Result<OutputFolder> {
     let Request { args, input, out_dir, frames, report } = request;
-    let pictures = || frames.iter().flat_map(|&frame| pictures_of(frame, &job.settings));
+    let pictures = || frames.iter().flat_map(|&frame| job.settings.pictures_of(frame));
     let is_elsewhere = args.output.report.is_some();
     if is_elsewhere {
         prepare_report(report)?;
@@ -281,15 +281,6 @@ fn refuse_parallel(scene: &Scene, settings: &Settings) -> Result<()> {
         }
         None => Ok(()),
     }
-}
-
-/// Each frame's pictures: one, or the eyes'.
-pub(super) fn pictures_of(frame: i64, settings: &Settings) -> impl Iterator<Item = FrameId> {
-    let eyes: &[Option<StereoEye>] = match settings.stereo {
-        Some(_) => &[Some(StereoEye::Left), Some(StereoEye::Right)],
-        None => &[None],
-    };
-    eyes.iter().map(move |&eye| FrameId { number: frame, eye })
 }
 
 /// Identifies everything that decides the pixels: the scene as read, the settings, the plan, and the program's version.

@@ -1,7 +1,6 @@
 //! What an output folder holds already: frames that may stay, and reports that must not be lost.
 
 use super::args::ConvertArgs;
-use super::convert::pictures_of;
 use super::interrupt::Interrupt;
 use super::say;
 use anyhow::Result;
@@ -25,7 +24,7 @@ pub fn existing(
     args: &ConvertArgs,
     interrupt: &Interrupt,
 ) -> Result<Vec<FrameRecord>> {
-    let pictures = || frames.iter().flat_map(|&number| pictures_of(number, settings));
+    let pictures = || frames.iter().flat_map(|&number| settings.pictures_of(number));
     if let Some(path) = pictures().map(|id| folder.file_of(id)).find(|path| path.is_dir()) {
         return Err(Error::output(path, "is a folder, where a frame is to be; move it away").into());
     }
@@ -42,7 +41,7 @@ pub fn existing(
     // Each file is read in full: thousands of them take their time. A pair is there if both of it are.
     let check_all = |&number: &i64| match interrupt.stop_requested() {
         Some(signal) => Err(Error::Interrupted { signal }),
-        None => Ok(pictures_of(number, settings).map(|id| check(folder, id, hash, settings)).collect()),
+        None => Ok(settings.pictures_of(number).map(|id| check(folder, id, hash, settings)).collect()),
     };
     let found: Vec<Vec<Found>> = frames.par_iter().map(check_all).collect::<buzz::Result<_>>()?;
     let stale: Vec<(&PathBuf, &String)> = found

@@ -114,6 +114,15 @@ impl Settings {
         let &Self { bounces, light_samples, ambient_samples, transparent, .. } = self;
         TraceOptions { bounces, light_samples, ambient_samples, transparent }
     }
+
+    /// The pictures of a frame: one, or the eyes'.
+    pub fn pictures_of(&self, frame: i64) -> impl Iterator<Item = FrameId> + use<> {
+        let eyes: &[Option<StereoEye>] = match self.stereo {
+            Some(_) => &[Some(StereoEye::Left), Some(StereoEye::Right)],
+            None => &[None],
+        };
+        eyes.iter().map(move |&eye| FrameId { number: frame, eye })
+    }
 }
 
 /// Told what happens, and asked whether to go on: by all threads, at every row of pixels.
