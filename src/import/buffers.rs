@@ -3,8 +3,8 @@
 use super::{
     budget::Budget,
     document::{Document, Element},
-    meshopt,
-    uri::{self, Source},
+    folder::Source,
+    meshopt, uri,
 };
 use crate::Result;
 use std::{cell::OnceCell, collections::HashMap, path::PathBuf, rc::Rc};

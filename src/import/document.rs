@@ -5,7 +5,7 @@
 //! precision, and panics or underflows on broken files (POSITION as VEC2, a count of 0, a GLB length under 12).
 //! Working round it needs a validator as long as this reader, and would still not give the element's pointer.
 
-use super::uri::Folder;
+use super::folder::Folder;
 use crate::{Error, Result, error::reason};
 use serde_json::{Map, Value};
 use std::{

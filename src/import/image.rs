@@ -4,8 +4,9 @@ use super::{
     accessor::Accessors,
     budget::Pictures,
     document::{Document, read_file},
+    folder::Source,
     ignored::Notes,
-    uri::{self, Source},
+    uri,
 };
 use crate::{
     Result,

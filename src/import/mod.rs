@@ -13,6 +13,7 @@ mod budget;
 mod buffers;
 mod document;
 mod extras;
+mod folder;
 mod geometry;
 mod gltf;
 mod ignored;

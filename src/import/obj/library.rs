@@ -3,8 +3,8 @@
 use super::{
     super::{
         document::read_file,
+        folder::{Folder, Source},
         ignored::Notes,
-        uri::{self, Folder, Source},
     },
     lines::{decode, split, statements},
 };
@@ -28,7 +28,7 @@ impl Libraries<'_> {
     /// The materials of the libraries that an `mtllib` names.
     pub fn load(&self, names: &Path) -> tobj::MTLLoadResult {
         let names = names.to_string_lossy();
-        let find = |name: &str| match uri::in_folder(self.folder, name) {
+        let find = |name: &str| match self.folder.find(name) {
             Ok(Source::File(path)) => Some(path),
             _ => None,
         };

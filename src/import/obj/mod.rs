@@ -9,7 +9,7 @@ mod statement;
 mod survey;
 mod textures;
 
-use super::{budget::Pictures, document::read_file, ignored::Notes, uri::Folder};
+use super::{budget::Pictures, document::read_file, folder::Folder, ignored::Notes};
 use crate::{
     Result,
     scene::{Instance, Node, Scene},

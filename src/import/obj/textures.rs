@@ -4,9 +4,9 @@ use super::{
     super::{
         budget::Pictures,
         document::read_file,
+        folder::{Folder, Source},
         ignored::Notes,
         image,
-        uri::{self, Folder, Source},
     },
     statement::Statement,
 };
@@ -115,7 +115,7 @@ impl Textures<'_> {
     }
 
     fn decode(&self, file: &str, place: &str) -> Result<Option<RgbaImage>> {
-        let data = match uri::in_folder(self.folder, file) {
+        let data = match self.folder.find(file) {
             Ok(Source::File(path)) => read_file(&path).map_err(|_| "it cannot be read".to_owned()),
             Ok(_) => Err("it is missing".to_owned()),
             Err(why) => Err(why),
