@@ -28,12 +28,12 @@ pub use memory::{MemorySink, NullSink};
 pub use naming::{NamePattern, NumberInName, number_in_name, numbers_in_name};
 pub use peak::{most_bytes, peak_bytes};
 pub use report::{
-    FrameRecord, FrameReport, IgnoredFeature, KeyFrame, Plan, Report, ReportInput, SceneSummary,
-    SegmentRange, Settings, TotalSeconds, Totals,
+    FrameRecord, FrameReport, IgnoredFeature, KeyFrame, Plan, Report, ReportInput, Run, RunSeconds,
+    SceneSummary, SegmentRange, Settings, TotalSeconds, Totals,
 };
 pub use resume::FrameFile;
 pub use review::Review;
-pub use runs::{Run, RunSeconds, earlier_runs};
+pub use runs::earlier_runs;
 pub use sink::ExrSink;
 pub use temporary::remove_temporary_files;
 pub use thumbnails::{Thumbnail, Thumbnails, WithThumbnails};

@@ -4,54 +4,11 @@
 //! A frame's counts are in its file, but no times, or files would differ from run to run. Times stand in the report of the
 //! run that rendered it, so a run that skips frames looks for such reports in the folder that its own will be in.
 
-use super::report::{FrameReport, Report, millionths};
+use super::report::{FrameReport, Report, Run};
 use super::{FrameRecord, SettingsHash};
 use crate::frame::{FrameId, StageSeconds};
-use serde::{Deserialize, Serialize};
 use std::collections::BTreeSet;
 use std::path::Path;
-
-/// A run that made frames of a report, or found them made.
-#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
-pub struct Run {
-    /// Name of the report that it wrote.
-    pub report: String,
-    /// When it began, in milliseconds since 1970.
-    pub started: u64,
-    /// Threads for everything.
-    pub threads: usize,
-    /// Its wall seconds that belong to no frame.
-    pub seconds: RunSeconds,
-    /// Most memory held, bytes: see [`super::peak_bytes`].
-    pub peak_bytes: u64,
-}
-
-/// Wall seconds of a run that belong to no frame.
-#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
-pub struct RunSeconds {
-    /// Reading the scene.
-    pub import: f64,
-    /// Building what rays are traced through.
-    pub accel: f64,
-    /// Choosing key frames.
-    pub plan: f64,
-    /// Frames that were not asked for, but from which others are inferred.
-    #[serde(default)]
-    pub on_the_way: f64,
-    /// From start to end.
-    pub wall: f64,
-}
-
-impl Run {
-    /// As reports have it.
-    pub(super) fn rounded(mut self) -> Self {
-        let RunSeconds { import, accel, plan, on_the_way, wall } = &mut self.seconds;
-        for seconds in [import, accel, plan, on_the_way, wall] {
-            *seconds = millionths(*seconds);
-        }
-        self
-    }
-}
 
 /// Gives each skipped frame of `records` the times of the run that rendered it; returns the runs that they come from, in
 /// the order in which they began, and what these warned of.
@@ -109,7 +66,7 @@ fn seconds_of(report: &Report, id: FrameId) -> Option<StageSeconds> {
 mod tests {
     use super::*;
     use crate::frame::{FrameKind, FrameStats};
-    use crate::output::{ReportInput, SettingsHasher};
+    use crate::output::{ReportInput, RunSeconds, SettingsHasher};
     use std::fs;
 
     fn hash(of: &str) -> SettingsHash {

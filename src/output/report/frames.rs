@@ -1,10 +1,9 @@
 //! What each frame took, and all of them together.
 
-use super::{FrameRecord, ReportInput};
+use super::{FrameRecord, ReportInput, RunSeconds};
 use crate::frame::{
     FrameId, FrameKind, FrameStats, PixelClass, RayCounts, StageSeconds, StereoEye, SubPixelCounts,
 };
-use crate::output::runs::RunSeconds;
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
 use std::collections::BTreeMap;
@@ -190,6 +189,6 @@ fn rounded(seconds: StageSeconds) -> StageSeconds {
 }
 
 /// Clocks tell no more, and seventeen digits are hard to read. What is not finite is 0: JSON has no word for it.
-pub(in crate::output) fn millionths(value: f64) -> f64 {
+pub(super) fn millionths(value: f64) -> f64 {
     if value.is_finite() { (value * 1e6).round() / 1e6 } else { 0.0 }
 }

@@ -1,17 +1,18 @@
 //! `report.json`: what was asked, what was planned, what was done and what it cost.
 
 mod frames;
+mod run;
 
-pub(super) use frames::millionths;
 pub use frames::{FrameReport, TotalSeconds, Totals};
+pub use run::{Run, RunSeconds};
 
 use super::SettingsHash;
-use super::runs::Run;
 use super::write::write_alone;
 use crate::frame::{FrameId, FrameKind, FrameStats};
 use crate::plan;
 use crate::scene::{Ignored, Rational};
 use crate::{Error, Result};
+use frames::millionths;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -229,7 +230,6 @@ impl Report {
 
 #[cfg(test)]
 mod tests {
-    use super::super::runs::RunSeconds;
     use super::*;
     use crate::frame::{PixelClass, RayCounts, StageSeconds, SubPixelCounts};
     use serde_json::Value;
